@@ -202,7 +202,7 @@ def measure_offset(
     if len(times_ns) < 2 * _HALF:
         return None
     table = _Table(times_ns, poses)
-    used = [one for one in backgrounds if len(one.times_ns) > FEWEST_FRAMES]
+    used = [background for background in backgrounds if len(background.times_ns) > FEWEST_FRAMES]
     offsets_s = -np.arange(0.0, LARGEST_S + _COARSE_S, _COARSE_S)
     residuals = _residuals(used, table, T_H_D, earliest_ns, offsets_s)
     if residuals is None:
@@ -260,25 +260,27 @@ def _residuals(
     Each background's mean is removed: its key frame's pose has noise, too.
     """
     parts = []
-    for one in backgrounds:
-        every = -(-(len(one.times_ns) - 1) // _USED_FRAMES)
-        index = np.arange(1, len(one.times_ns), every)
-        times_s = 1e-9 * (np.array(one.times_ns)[[0, *index]] + earliest_ns - table.first_ns)
-        seen = np.array([one.moved[i - 1] for i in index], dtype=np.float64)
+    for background in backgrounds:
+        every = -(-(len(background.times_ns) - 1) // _USED_FRAMES)
+        index = np.arange(1, len(background.times_ns), every)
+        times_s = 1e-9 * (np.array(background.times_ns)[[0, *index]] + earliest_ns - table.first_ns)
+        moved = np.array([background.moved[i - 1] for i in index], dtype=np.float64)
         # At all offsets alike, so that their costs can be compared.
         is_known = table.covers(times_s) & table.covers(times_s + offsets_s.min())
         if not is_known[0] or is_known.sum() < FEWEST_FRAMES // 2:
             continue
-        seen, times_s = seen[is_known[1:]], times_s[is_known]
-        part = np.array([_apart(one, table, T_H_D, times_s + offset, seen) for offset in offsets_s])
+        moved, times_s = moved[is_known[1:]], times_s[is_known]
+        part = np.array(
+            [_apart(background, table, T_H_D, times_s + offset, moved) for offset in offsets_s]
+        )
         parts.append(part - part.mean(axis=1, keepdims=True))
     return np.concatenate(parts, axis=1) if parts else None
 
 
 def _apart(
-    background: Background, table: _Table, T_H_D: Float64, times_s: Float64, seen: Float64
+    background: Background, table: _Table, T_H_D: Float64, times_s: Float64, moved: Float64
 ) -> Float64:
-    """Return (frames, 2): the points' mean movement, seen minus predicted."""
+    """Return (frames, 2): the points' mean movement, measured minus predicted."""
     R_W_H, t_W_m = table.at(times_s)
     T_H_C = T_H_D @ invert(background.T_C_D)
     R_W_C = R_W_H @ T_H_C[:3, :3]
@@ -286,7 +288,7 @@ def _apart(
     points_W_m = background.points_C_m @ R_W_C[0].T + t_W_m[0]
     points_C_m = (points_W_m - t_W_m[1:, None]) @ R_W_C[1:]
     start = background.points_C_m[:, :2] / background.points_C_m[:, 2:]
-    apart = seen - (points_C_m[..., :2] / points_C_m[..., 2:] - start)
+    apart = moved - (points_C_m[..., :2] / points_C_m[..., 2:] - start)
     # A point that is hidden by the hand moves with it.
     off = np.linalg.norm(apart - _median(apart), axis=2)
     apart[~(off <= 2.5 * _median(off))] = np.nan

@@ -85,8 +85,8 @@ class Drawing:
 def rig_name(rig: Rig) -> str:
     """Return the rig's name in one line, with eight digits that change with its displays."""
     offline = {
-        eye: Projection(eye, projection_matrix(one), one.width_px, one.height_px, one.T_V_H)
-        for eye, one in rig.eyes.items()
+        eye: Projection(eye, projection_matrix(view), view.width_px, view.height_px, view.T_V_H)
+        for eye, view in rig.eyes.items()
     }
     name = "".join(character for character in rig.name if character >= " ")
     return f"{name[:80]} {drawn_digest(offline, None).hex()[:8]}"

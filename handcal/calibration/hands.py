@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -142,13 +143,13 @@ class RecentHands:
         """Return the hands just before and at a hand, back to where it was elsewhere."""
         held = [hand]
         # In the order of exposure: a frame's time is estimated again when one arrives sooner.
-        for one in sorted(self._placed, key=lambda placed: placed.t_host_ns, reverse=True):
-            if one is hand or one.t_host_ns > hand.t_host_ns:
+        for earlier in sorted(self._placed, key=lambda placed: placed.t_host_ns, reverse=True):
+            if earlier is hand or earlier.t_host_ns > hand.t_host_ns:
                 continue
-            is_near = float(np.linalg.norm(one.middle_W_m - hand.middle_W_m)) < _HOLD_M
-            if not is_near or hand.t_host_ns - one.t_host_ns > _STEADY_NS:
+            is_near = float(np.linalg.norm(earlier.middle_W_m - hand.middle_W_m)) < _HOLD_M
+            if not is_near or hand.t_host_ns - earlier.t_host_ns > _STEADY_NS:
                 break
-            held.append(one)
+            held.append(earlier)
         return held[::-1]
 
     def placed_until_ns(self) -> int:
@@ -165,7 +166,7 @@ class RecentHands:
         """
         near = [hand for hand in self._placed if abs(hand.t_host_ns - t_host_ns) <= MATCH_NS]
         if not near:
-            missed = min(self._missed, key=lambda one: abs(one[0] - t_host_ns), default=(0, None))
+            missed = min(self._missed, key=lambda miss: abs(miss[0] - t_host_ns), default=(0, None))
             if isinstance(missed[1], OutOfViewError):
                 raise OutOfViewError(*missed[1].args)  # the stored one must hold no traceback
             if all(abs(frame_ns - t_host_ns) > MATCH_NS for frame_ns in self._frames_ns):
@@ -175,15 +176,15 @@ class RecentHands:
 
     def speed_m_s(self, hand: PlacedHand) -> float:
         """Return the hand's speed in the world at a placed hand; 0 if there is no other in time."""
-        apart_s = [1e-9 * abs(one.t_host_ns - hand.t_host_ns) for one in self._placed]
+        apart_s = [1e-9 * abs(placed.t_host_ns - hand.t_host_ns) for placed in self._placed]
         others = [
-            (abs(s - _SPEED_S), s, one)
-            for s, one in zip(apart_s, self._placed, strict=True)
+            (abs(s - _SPEED_S), s, placed)
+            for s, placed in zip(apart_s, self._placed, strict=True)
             if 0.0 < s <= 3.0 * _SPEED_S
         ]
         if not others:
             return 0.0
-        _, s, other = min(others, key=lambda one: one[0])
+        _, s, other = min(others, key=itemgetter(0))
         return float(np.linalg.norm(other.middle_W_m - hand.middle_W_m)) / s
 
     def clear(self) -> None:
@@ -239,24 +240,26 @@ def merge_hold(hands: Sequence[PlacedHand], reference: PlacedHand) -> PlacedHand
     """
     middles = np.array([hand.middle_W_m for hand in hands])
     movement_m = float(np.linalg.norm(np.ptp(middles, axis=0)))
-    some = [hand for hand in hands if hand is not reference]
-    some = some[:: max(1, -(-len(some) // (_MOST_FRAMES - 1)))]
-    some = _in_one_place(some, reference)
-    if not some:
+    others = [hand for hand in hands if hand is not reference]
+    others = others[:: max(1, -(-len(others) // (_MOST_FRAMES - 1)))]
+    others = _in_one_place(others, reference)
+    if not others:
         return replace(reference, movement_m=movement_m)
     T_D_W = invert(reference.T_W_D)
     points_m = transform(T_D_W, reference.points_W_m)
     rays = points_m[:, :2] / points_m[:, 2:]
     apart, _ = cKDTree(rays).query(rays, k=2)
     reach = _REACH * float(np.median(np.asarray(apart)[:, 1]))
-    depths_m = np.full((1 + len(some), len(points_m)), np.nan)
+    depths_m = np.full((1 + len(others), len(points_m)), np.nan)
     is_cut = np.zeros_like(depths_m, dtype=np.bool_)
     depths_m[0], is_cut[0] = points_m[:, 2], reference.cloud.is_cut
-    for row, hand in enumerate(some, start=1):
-        seen_m = transform(T_D_W, hand.points_W_m)
-        found = cKDTree(seen_m[:, :2] / seen_m[:, 2:]).query(rays, distance_upper_bound=reach)
-        is_seen, index = np.isfinite(found[0]), np.asarray(found[1])
-        depths_m[row, is_seen] = seen_m[index[is_seen], 2]
+    for row, hand in enumerate(others, start=1):
+        surface_m = transform(T_D_W, hand.points_W_m)
+        nearest = cKDTree(surface_m[:, :2] / surface_m[:, 2:]).query(
+            rays, distance_upper_bound=reach
+        )
+        is_seen, index = np.isfinite(nearest[0]), np.asarray(nearest[1])
+        depths_m[row, is_seen] = surface_m[index[is_seen], 2]
         is_cut[row, is_seen] = hand.cloud.is_cut[index[is_seen]]
     measured = np.isfinite(depths_m)
     kept = measured.mean(axis=0) >= _SEEN
@@ -273,7 +276,7 @@ def merge_hold(hands: Sequence[PlacedHand], reference: PlacedHand) -> PlacedHand
         reference,
         cloud=cloud,
         points_W_m=transform(reference.T_W_D, merged_m),
-        frames=1 + len(some),
+        frames=1 + len(others),
         movement_m=movement_m,
     )
 
@@ -284,13 +287,13 @@ def _in_one_place(hands: Sequence[PlacedHand], reference: PlacedHand) -> list[Pl
     None if almost all points of one lie at cut edges.
     """
     try:
-        place, *seen = [
+        place, *surfaces = [
             describe_surface(hand.points_W_m, hand.cloud.is_cut, _SETTINGS.max_points)
             for hand in (reference, *hands)
         ]
     except HandError:
         return []
-    return [hand for hand, surface in zip(hands, seen, strict=True) if _is_at(surface, place)]
+    return [hand for hand, surface in zip(hands, surfaces, strict=True) if _is_at(surface, place)]
 
 
 def _is_at(surface: Surface, place: Surface) -> bool:

@@ -77,21 +77,21 @@ def run_learn_prior(
         If it was cancelled.
     """
     journals = sorted(find_journals(folder), key=modified_s, reverse=True)[:MAX_SESSIONS]
-    found: list[tuple[str, str, list[Observed]]] = []
+    sittings_read: list[tuple[str, str, list[Observed]]] = []
     left_out: Counter[str] = Counter()
     for number, journal in enumerate(journals):
         progress.at(number / len(journals), f"Reading session {number + 1} of {len(journals)}")
         try:
-            found.append(_read_session(journal, rig))
+            sittings_read.append(_read_session(journal, rig))
         except _NotUsableError as reason:
             left_out[str(reason)] += 1
     # By their start: a corrected name or saved notes change a journal later.
-    newest = {whose: observed for _, whose, observed in sorted(found, key=itemgetter(0))}
-    if len(newest) < len(found):
-        left_out["earlier sessions of the same wearer"] = len(found) - len(newest)
+    newest = {wearer: observed for _, wearer, observed in sorted(sittings_read, key=itemgetter(0))}
+    if len(newest) < len(sittings_read):
+        left_out["earlier sessions of the same wearer"] = len(sittings_read) - len(newest)
     by_person: dict[str, list[list[Observed]]] = {}
-    for _, whose, observed in found:
-        by_person.setdefault(whose, []).append(observed)
+    for _, wearer, observed in sittings_read:
+        by_person.setdefault(wearer, []).append(observed)
     return LabPrior(
         learn_prior(list(newest.values()), settings, sitting_prior(rig, SittingSettings())),
         tuple(tuple(sittings) for sittings in by_person.values() if len(sittings) > 1),
@@ -124,7 +124,7 @@ def _read_session(journal: Path, rig: Rig) -> tuple[str, str, list[Observed]]:
     if state.results.get("version") != RESULTS_VERSION:
         raise _NotUsableError("solved by another version")
     eyes = state.results.get("eyes")
-    verdicts = [one.get("verdict") for one in eyes.values()] if isinstance(eyes, dict) else []
+    verdicts = [eye.get("verdict") for eye in eyes.values()] if isinstance(eyes, dict) else []
     if "contradicted" in verdicts or "implausible" in verdicts:
         raise _NotUsableError("contradicted or implausible")
     observed = _observations(state.results.get("observed"))
@@ -159,8 +159,8 @@ def _observations(stored: object) -> list[Observed]:
         raise _NotUsableError("not readable")
     try:
         observed = [
-            tuple(np.array(one[name], dtype=np.float64) for name in _OBSERVED_SHAPES)
-            for one in stored
+            tuple(np.array(row[name], dtype=np.float64) for name in _OBSERVED_SHAPES)
+            for row in stored
         ]
     except (KeyError, TypeError, ValueError):
         raise _NotUsableError("not readable") from None

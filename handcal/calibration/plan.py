@@ -18,7 +18,7 @@ from handcal.calibration.procedure import Calibration
 from handcal.calibration.sight import Observation
 from handcal.calibration.states import ProcedureError, State
 from handcal.core.errors import FileError, HandError
-from handcal.core.types import EYES, Eye, EyePlan, Frame, PlanName, Verdict, VerdictName
+from handcal.core.types import EYES, Eye, EyePlan, Float64, Frame, PlanName, Verdict, VerdictName
 from handcal.register.placement import PlacementSettings, Planned, next_alignment, next_verification
 from handcal.register.verdict import Advice, planned_eyes
 
@@ -104,6 +104,11 @@ class NextStep:
     is_requested: bool = False
     """True if a person has asked for it."""
 
+    @property
+    def displacement_W_m(self) -> Float64 | None:
+        """(3,); from the raised hand to the cursor, if the plan chooses its place."""
+        return None if self.planned is None else self.planned.displacement_W_m
+
 
 class Plan:
     """Leads one calibration by a plan, frame by frame.
@@ -150,8 +155,7 @@ class Plan:
     ) -> None:
         """Take a frame through the calibration, from the picture to the projections.
 
-        Every calibration goes this way from top to bottom, each frame as far as it is due. What the
-        session cannot write is kept in memory; `Session.write_waiting` says so.
+        Every calibration goes this way from top to bottom, each frame as far as it is due.
 
         Parameters
         ----------
@@ -166,6 +170,8 @@ class Plan:
         ------
         LinkError
             If the link is closed, or projections were not acknowledged in time.
+        FileError
+            If the session cannot be written, which keeps the data; the step is done anyway.
         """
         calibration = self._calibration
         if frame is not None:
@@ -175,21 +181,24 @@ class Plan:
             # Observation → alignment or verification → journal. The wearer's press was some time
             # ago, so the hand of that time is judged, not the newest.
             self.observation = calibration.judge(observation)
-        if self.observation is None:
+        if calibration.state is State.APPLYING:
+            # Link → journal. The headset acknowledges projections some frames after they were sent.
+            calibration.poll_applied()
+        if self.observation is None or (frame is None and not is_pressed):
             return
-        # Procedure. The plan only chooses; the calibration refuses what is out of turn.
-        self.step = step = self.next_step(self.observation.is_steady)
-        is_automatic = frame is not None and not is_held and self._is_due(step, self.observation)
+        # Procedure. The plan only chooses; the calibration refuses what is out of turn. A cursor
+        # that was withdrawn has made it forget the hands, so the observation may be outdated.
+        is_steady = self.observation.is_steady and calibration.steady_hand is not None
+        self.step = step = self.next_step(is_steady)
+        is_due = is_pressed or (not is_held and self._is_due(step, self.observation))
         try:
-            match step.name if is_pressed or is_automatic else None:
+            match step.name if is_due else None:
                 case StepName.CURSOR:
                     # Hand → cursor: where the hand is, or where an alignment tells most.
-                    place_m = None if step.planned is None else step.planned.displacement_W_m
-                    calibration.make_cursor(step.eyes, place_m)
+                    calibration.make_cursor(step.eyes, step.displacement_W_m)
                 case StepName.SOLVE:
-                    # Alignments → φ → verdict → journal. Each is solved alone, all are fused with
-                    # the prior and the verifications by their covariances; the verdict asks for
-                    # evidence from outside, because residuals cannot tell that φ is right.
+                    # Alignments → φ → verdict → journal. All are fused by their covariances, and
+                    # judged by evidence from outside: residuals cannot tell that φ is right.
                     if calibration.state is State.ALIGNED:
                         self._requested = ()
                     calibration.solve()
@@ -201,15 +210,9 @@ class Plan:
                     calibration.verify(step.eyes[0])
                 case StepName.DONE if not self._is_over:
                     calibration.release_hand()
-            if is_pressed or is_automatic:
-                self._is_over = step.name is StepName.DONE
-            if calibration.state is State.APPLYING:
-                # Link → journal. Only what the headset has acknowledged is applied.
-                calibration.poll_applied()
+            self._is_over = is_due and step.name is StepName.DONE
         except (ProcedureError, HandError) as error:
             self.step = replace(step, name=StepName.WAIT, text=str(error), planned=None)
-        except FileError:
-            pass  # the session keeps it, and the station says so
 
     def next_step(self, is_steady: bool) -> NextStep:
         """Return the next step; nothing changes. `is_steady`: the hand is in view and still."""
@@ -334,7 +337,7 @@ class Plan:
     def _made(self, eyes: tuple[Eye, ...]) -> int:
         """Return the number of alignments in which these eyes were open."""
         made = (alignment.eyes for alignment in self._calibration.alignments.values())
-        return sum(set(eyes) <= set(one) for one in made)
+        return sum(set(eyes) <= set(opened) for opened in made)
 
     def _worst_advice(self) -> Advice | None:
         """Return the advice for the eye that is to be repeated with the largest expected error."""
@@ -372,7 +375,7 @@ class Plan:
                     calibration.T_W_H(newest),
                     calibration.rig,
                     calibration.results,
-                    [one.eyes for one in calibration.alignments.values()],
+                    [alignment.eyes for alignment in calibration.alignments.values()],
                     calibration.applied_shift_m,
                     plan="recommended",
                     usable_eyes=self.settings.usable_eyes,
@@ -389,21 +392,21 @@ class Plan:
 
     def _fault(self, *names: VerdictName) -> str:
         """Return the reason of the first verdict with one of these names; empty if none has."""
-        return next((one.reason for one in self._verdicts() if one.name in names), "")
+        return next((verdict.reason for verdict in self._verdicts() if verdict.name in names), "")
 
     def _verdicts(self) -> list[Verdict]:
         """Return the verdicts on the usable eyes; an eye may have been aligned before a choice."""
         results = self._calibration.results
-        found = {} if results is None else results.verdicts
-        return [one for eye, one in found.items() if eye in self.settings.usable_eyes]
+        verdicts = {} if results is None else results.verdicts
+        return [verdict for eye, verdict in verdicts.items() if eye in self.settings.usable_eyes]
 
     def _end(self, unverified: tuple[Eye, ...]) -> str:
         """Return why the recommended plan ends now; else empty."""
         results = self._calibration.results
         if results is None:
             return ""
-        found = {eye: one.name for eye, one in results.verdicts.items()}
-        is_judged = all(found.get(eye) in _JUDGED for eye in self.settings.usable_eyes)
+        names = {eye: verdict.name for eye, verdict in results.verdicts.items()}
+        is_judged = all(names.get(eye) in _JUDGED for eye in self.settings.usable_eyes)
         is_verified = not (unverified and self.settings.verify)
         # A stored calibration that its verification does not refuse is kept.
         is_kept = not self._calibration.alignments or self._next_verification() is None
@@ -426,7 +429,7 @@ class Plan:
 
     def _takes(self) -> str:
         """Return what it would take to be accepted."""
-        reasons = dict.fromkeys(one.reason for one in self._verdicts())
+        reasons = dict.fromkeys(verdict.reason for verdict in self._verdicts())
         return " ".join(reasons) or "nothing more is planned"
 
     def _with_hand(self, name: StepName, eyes: tuple[Eye, ...], is_steady: bool) -> NextStep:

@@ -1,4 +1,4 @@
-"""What each frame shows: the hand, found and placed in the world, and the evidence against it.
+"""The contents of each frame: the hand, found and placed in the world, and the evidence against it.
 
 The solver's residuals cannot show that the picture was frozen, that another camera than the rig's
 gave it, or that the headset did not draw what the PC believes. Each of these is watched for
@@ -47,9 +47,9 @@ class Contradiction:
     name: str
     """Short name, as in ``handcal demo --fault``."""
     what: str
-    """What was found."""
+    """The finding."""
     advice: str = ""
-    """What the technician can do about it."""
+    """Recommended action of the technician."""
 
     @property
     def text(self) -> str:

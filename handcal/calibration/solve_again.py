@@ -139,14 +139,14 @@ def solve_sound(
 
 def check_solvable(path: Path) -> SessionCheck:
     """Return whether a session is sound and can be solved, with all that is not."""
-    found = check_session(path)
-    if found.state == "none":
-        return found
+    check = check_session(path)
+    if check.state == "none":
+        return check
     record = Session.open(path)
     try:
         damaged = solve_sound(record, stored_solve_settings(record))[0].damaged
     except FileError as error:
-        damaged = (*found.damaged, Damage("results.json", None, f"there can be none: {error}"))
+        damaged = (*check.damaged, Damage("results.json", None, f"there can be none: {error}"))
     return SessionCheck("damaged" if damaged else "sound", damaged)
 
 
@@ -225,7 +225,7 @@ def read_former(path: Path, rig: Rig) -> Former:
     results = solve_again(record, stored_solve_settings(record))
     if results is None:
         raise FileError(f"{path} has no alignment", "start without it")
-    faulty = [one for one in results.verdicts.values() if one.name in _FAULTY]
+    faulty = [verdict for verdict in results.verdicts.values() if verdict.name in _FAULTY]
     if faulty:
         raise FileError(f"{path} is not a calibration to start from: {faulty[0].reason}")
     fused = results.fused

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -58,55 +58,36 @@ class VerifyingView:
     """True if the program has moved the drawing aside, for the wearer to bring it back."""
 
 
+@dataclass(slots=True, eq=False)
 class Verifying:
-    """One eye's drawing, moved by the wearer.
+    """One eye's drawing, moved by the wearer."""
 
-    Parameters
-    ----------
-    request : VerifyRequest
-        As sent to the headset.
-    display : EyeDisplay
-        Of this eye.
-    before_m : (3,) float64
-        φ that the eye is drawn with at the start.
-    hand_E_m : (3,) float64
-        Centre of the hand in the eye's E.
-    began_host_ns : int
+    request: VerifyRequest
+    """As sent to the headset."""
+    display: EyeDisplay
+    """Of this eye."""
+    before_m: Float64
+    """(3,); φ that the eye is drawn with at the start."""
+    hand_E_m: Float64
+    """(3,); centre of the hand in the eye's E."""
+    began_host_ns: int = 0
+    """Time of its first frame; 0 if it was resumed."""
+    moved: NudgeSum = field(default_factory=NudgeSum)
+    """All movement by the wearer and the technician so far."""
+    offset: NudgeSum = field(default_factory=NudgeSum)
+    """Movement by the program, for the wearer to bring the drawing back."""
+    shift_m: Float64 = field(init=False)
+    """(3,); φ with both."""
+    fits: Nudge | None = None
+    """The wearer's confirmation that the drawing covers the hand, until it is judged."""
+    refusal: str = ""
+    """Reason why the last confirmation was refused; empty if none was."""
+    _heard: NudgeSum = field(default_factory=NudgeSum)
+    _session: int = 0
+    _earlier: list[NudgeSum] = field(default_factory=list)
 
-    Attributes
-    ----------
-    moved : NudgeSum
-        All movement by the wearer and the technician so far.
-    offset : NudgeSum
-        Movement by the program, for the wearer to bring the drawing back.
-    shift_m : (3,) float64
-        φ with it.
-    fits : Nudge or None
-        The wearer's confirmation that the drawing covers the hand, until it is judged.
-    refusal : str
-        Reason why the last confirmation was refused; empty if none was.
-    """
-
-    def __init__(
-        self,
-        request: VerifyRequest,
-        display: EyeDisplay,
-        before_m: Float64,
-        hand_E_m: Float64,
-        began_host_ns: int = 0,
-    ) -> None:
-        self.request = request
-        self.before_m = before_m
-        self.hand_E_m = hand_E_m
-        self.moved = self.offset = NudgeSum()
-        self.shift_m = before_m
-        self.fits: Nudge | None = None
-        self.refusal = ""
-        self._display = display
-        self._began_host_ns = began_host_ns
-        self._heard = NudgeSum()
-        self._session = 0
-        self._earlier: list[NudgeSum] = []
+    def __post_init__(self) -> None:
+        self.shift_m = self.before_m
 
     @property
     def eye(self) -> Eye:
@@ -121,7 +102,7 @@ class Verifying:
             _triple(self.before_m),
             _triple(self.shift_m),
             can_undo=bool(self._earlier),
-            began_host_ns=self._began_host_ns,
+            began_host_ns=self.began_host_ns,
             is_set_aside=self.offset != NudgeSum(),
         )
 
@@ -213,7 +194,7 @@ class Verifying:
     def _draw(self, moved: NudgeSum) -> None:
         total = moved.plus(self.offset.right_arcmin, self.offset.down_arcmin, self.offset.size)
         self.shift_m = nudged_shift_m(
-            self._display,
+            self.display,
             self.before_m,
             self.hand_E_m,
             total.right_arcmin,

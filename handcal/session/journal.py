@@ -45,11 +45,11 @@ class Damage:
     """Number of the journal's line, from 1; None for another file."""
     what: str
     instead: str = ""
-    """What was done instead; empty for nothing."""
+    """The consequence, such as what was left out; empty for nothing."""
 
     @property
     def text(self) -> str:
-        """The damage, and what was done instead."""
+        """The damage, and its consequence."""
         return f"{self.what}; {self.instead}" if self.instead else self.what
 
     def __str__(self) -> str:

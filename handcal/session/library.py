@@ -27,7 +27,6 @@ from handcal.session.record import (
     MAX_ALIGNMENT_BYTES,
     MAX_NOTES_CHARACTERS,
     Replayed,
-    SessionRecord,
     alignment_path,
     replay,
     sha256,
@@ -410,36 +409,14 @@ class UnfinishedSession:
     """Numbers of those that are not deleted."""
     verified: int = 0
     """Number of verified eyes; after a slipped headset they are all there is."""
-    is_verifying: bool = False
-    """True if a verification was begun, of which nothing else may remain."""
+    is_worth_resuming: bool = False
+    """As in `SessionRecord`."""
     damaged: int = 0
     """Number of damaged parts, which are left out when it is resumed."""
     problem: str = ""
     """Reason why it cannot be resumed, such as another program; empty if it can."""
     is_repaired: bool = False
     """True if a repaired copy of this damaged session is in the same folder."""
-
-    @property
-    def is_worth_resuming(self) -> bool:
-        """True if it holds an alignment, a trial or a verification, be it one only begun."""
-        return bool(self.alignments or self.trials or self.verified or self.is_verifying)
-
-
-def summarize(
-    record: SessionRecord, started: str = "", *, has_copy: bool = False
-) -> UnfinishedSession:
-    """Return what an unfinished session holds; `has_copy`: a repaired copy is beside it."""
-    return UnfinishedSession(
-        record.path,
-        started,
-        record.wearer,
-        len(record.alignments),
-        len(record.trials),
-        len(record.facts.verified),
-        any(event.name == VERIFYING for event in record.events),
-        len(record.damaged),
-        is_repaired=bool(record.damaged) and has_copy,
-    )
 
 
 def unfinished_and_repaired(parent: Path) -> tuple[list[UnfinishedSession], set[Path]]:
@@ -482,4 +459,14 @@ def _inspect(
         record = Session.open(path)
     except FileError as error:
         return UnfinishedSession(path, started, problem=str(error))
-    return summarize(record, started, has_copy=has_copy)
+    return UnfinishedSession(
+        path,
+        started,
+        record.wearer,
+        len(record.alignments),
+        len(record.trials),
+        len(record.facts.verified),
+        record.is_worth_resuming,
+        len(record.damaged),
+        is_repaired=bool(record.damaged) and has_copy,
+    )

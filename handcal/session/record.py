@@ -24,7 +24,13 @@ from handcal.session.journal import (
     JournalContent,
     read_journal,
 )
-from handcal.session.state import AlignmentFacts, SessionEvent, SessionFacts, SessionState
+from handcal.session.state import (
+    VERIFYING,
+    AlignmentFacts,
+    SessionEvent,
+    SessionFacts,
+    SessionState,
+)
 from handcal.session.trial import EyeTrials, Trial, judge_trials, trial_errors_arcmin
 
 MAX_ALIGNMENT_BYTES = 16 * 2**20
@@ -93,6 +99,12 @@ class SessionRecord:
             for newest in self.facts.verified.values()
             for one in (*newest.earlier, newest)
         )
+
+    @property
+    def is_worth_resuming(self) -> bool:
+        """True if it holds an alignment, a trial or a verification, be it one only begun."""
+        is_verifying = any(event.name == VERIFYING for event in self.events)
+        return bool(self.alignments or self.trials or self.facts.verified or is_verifying)
 
     @property
     def simulated(self) -> str:

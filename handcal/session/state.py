@@ -185,27 +185,19 @@ VERIFYING = "verifying"
 """The station's event at the start of a verification and after each nudge."""
 
 
+@dataclass(slots=True, eq=False)
 class NumberedItems(Generic[Item]):
-    """Items numbered from 1 that can be deleted and restored; a number is never used twice.
+    """Items numbered from 1 that can be deleted and restored; a number is never used twice."""
 
-    At most `limit` are active.
-
-    Attributes
-    ----------
-    active, deleted : dict of int to item
-    taken : int
-        Numbers up to this one are not used again, even if their items are unknown.
-    has_gaps : bool
-        True if numbers may be missing, because the session is or was damaged.
-    """
-
-    def __init__(self, kind: Kind, limit: int) -> None:
-        self.active: dict[int, Item] = {}
-        self.deleted: dict[int, Item] = {}
-        self.taken = 0
-        self.has_gaps = False
-        self._kind = kind
-        self._limit = limit
+    kind: Kind
+    limit: int
+    """Most active items."""
+    active: dict[int, Item] = field(default_factory=dict)
+    deleted: dict[int, Item] = field(default_factory=dict)
+    taken: int = 0
+    """Numbers up to this one are not used again, even if their items are unknown."""
+    has_gaps: bool = False
+    """True if numbers may be missing, because the session is or was damaged."""
 
     def last(self) -> int:
         """Return the greatest number given so far; 0 if there is none."""
@@ -214,28 +206,28 @@ class NumberedItems(Generic[Item]):
     def next_number(self) -> int:
         """Return the number of the next item; ValueError if there are too many."""
         number = 1 + self.last()
-        if len(self.active) >= self._limit or number > _DELETED_LIMIT * self._limit:
-            raise ValueError(f"no room for more than {self._limit} {self._kind}s")
+        if len(self.active) >= self.limit or number > _DELETED_LIMIT * self.limit:
+            raise ValueError(f"no room for more than {self.limit} {self.kind}s")
         return number
 
     def save(self, number: int, item: Item) -> None:
         """Add an item; ValueError unless its number is the next one, or later with gaps."""
-        first, last = self.next_number(), _DELETED_LIMIT * self._limit
+        first, last = self.next_number(), _DELETED_LIMIT * self.limit
         if not first <= number <= (last if self.has_gaps else first):
-            raise ValueError(f"{self._kind} {number} is not the next")
+            raise ValueError(f"{self.kind} {number} is not the next")
         self.active[number] = item
 
     def require_active(self, number: int) -> None:
         """Raise ValueError unless there is an active item of this number."""
         if number not in self.active:
-            raise ValueError(f"there is no {self._kind} {number}")
+            raise ValueError(f"there is no {self.kind} {number}")
 
     def require_deleted(self, number: int) -> None:
         """Raise ValueError unless there is a deleted item of this number."""
         if number not in self.deleted:
-            raise ValueError(f"there is no deleted {self._kind} {number}")
-        if len(self.active) >= self._limit:
-            raise ValueError(f"no room for more than {self._limit} {self._kind}s")
+            raise ValueError(f"there is no deleted {self.kind} {number}")
+        if len(self.active) >= self.limit:
+            raise ValueError(f"no room for more than {self.limit} {self.kind}s")
 
     def delete(self, number: int) -> None:
         """Delete an active item; ValueError if there is none."""
@@ -248,59 +240,43 @@ class NumberedItems(Generic[Item]):
         self.active = dict(sorted({**self.active, number: self.deleted.pop(number)}.items()))
 
 
+@dataclass(slots=True, eq=False)
 class SessionState:
-    """The state of a session after the events applied so far.
+    """The state of a session after the events applied so far."""
 
-    Attributes
-    ----------
-    rig : str
-        Content of the rig file; empty if the first line of the journal is lost.
-    rig_sha256 : str
-        Its checksum.
-    settings : dict or None
-        None if that line is lost.
-    wearer : str
-    former_wearers : list of str
-        Names before each correction.
-    notes_sha256 : tuple of str or None
-        Checksums of the notes that may be stored: the newest, and those before; an empty text if
-        there are none. Empty if unknown.
-    results : dict or None
-        The newest results.
-    older_results : list of dict
-        Those before.
-    facts : SessionFacts
-    verified_now : frozenset of eye
-    alignment_facts : dict of int to AlignmentFacts
-    alignments : NumberedItems of str
-        Checksums.
-    trials : NumberedItems of Trial
-    is_solved, is_applied, is_finished : bool
-    applied_shift_m : dict of eye to (3,) float64
-    fine_tuned : dict of eye to (3,) float64, or None
-    went_back : bool
-        As in `handcal.session.session.SessionRecord`.
-    """
-
-    def __init__(self) -> None:
-        self.rig = self.rig_sha256 = self.wearer = ""
-        self.former_wearers: list[str] = []
-        self.settings: dict[str, Any] | None = None
-        self.notes_sha256: tuple[str | None, ...] = ()
-        self.results: dict[str, Any] | None = None
-        self.older_results: list[dict[str, Any]] = []
-        self.facts = SessionFacts()
-        self._verified_with: dict[Eye, frozenset[int]] = {}
-        self.alignment_facts: dict[int, AlignmentFacts] = {}
-        self.alignments = NumberedItems[str]("alignment", MAX_ALIGNMENTS)
-        self.trials = NumberedItems[Trial]("trial", MAX_TRIALS)
-        self.is_solved = False
-        self.is_applied = False
-        self.is_finished = False
-        self.applied_shift_m: dict[Eye, Float64] = {}
-        self.fine_tuned: dict[Eye, Float64] | None = None
-        self._by_hand: dict[Eye, Float64] = {}
-        self._is_going_back = self._is_back = False
+    rig: str = ""
+    """Content of the rig file; empty if the first line of the journal is lost."""
+    rig_sha256: str = ""
+    """Its checksum."""
+    settings: dict[str, Any] | None = None
+    """None if that line is lost."""
+    wearer: str = ""
+    former_wearers: list[str] = field(default_factory=list)
+    """Names before each correction."""
+    notes_sha256: tuple[str | None, ...] = ()
+    """Checksums of the notes that may be stored: the newest, and those before; an empty text if
+    there are none. Empty if unknown."""
+    results: dict[str, Any] | None = None
+    """The newest results."""
+    older_results: list[dict[str, Any]] = field(default_factory=list)
+    """Those before."""
+    facts: SessionFacts = field(default_factory=SessionFacts)
+    alignment_facts: dict[int, AlignmentFacts] = field(default_factory=dict)
+    alignments: NumberedItems[str] = field(
+        default_factory=lambda: NumberedItems("alignment", MAX_ALIGNMENTS)
+    )
+    """Checksums."""
+    trials: NumberedItems[Trial] = field(default_factory=lambda: NumberedItems("trial", MAX_TRIALS))
+    is_solved: bool = False
+    is_applied: bool = False
+    is_finished: bool = False
+    applied_shift_m: dict[Eye, Float64] = field(default_factory=dict)
+    fine_tuned: dict[Eye, Float64] | None = None
+    """These five as in `handcal.session.session.SessionRecord`."""
+    _verified_with: dict[Eye, frozenset[int]] = field(default_factory=dict)
+    _by_hand: dict[Eye, Float64] = field(default_factory=dict)
+    _is_going_back: bool = False
+    _is_back: bool = False
 
     @property
     def verified_now(self) -> frozenset[Eye]:
@@ -312,7 +288,7 @@ class SessionState:
     def set_by_hand_m(self) -> dict[Eye, Float64]:
         """Each (3,); φ last set by hand since the results, of the eyes that are drawn with it."""
         drawn, by_hand = self.fine_tuned or {}, self._by_hand
-        return {e: one for e, one in drawn.items() if e in by_hand and (one == by_hand[e]).all()}
+        return {eye: m for eye, m in drawn.items() if eye in by_hand and (m == by_hand[eye]).all()}
 
     @property
     def went_back(self) -> bool:

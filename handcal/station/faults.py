@@ -1,4 +1,7 @@
-"""Faults of the simulated camera and headset, on demand."""
+"""Faults of the simulated camera and headset, on demand.
+
+The command line offers them before it has imported anything of the station, which takes seconds.
+"""
 
 from __future__ import annotations
 

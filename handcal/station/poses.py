@@ -1,4 +1,4 @@
-"""What the poses of a headset tell while the head turns: the camera's place, and their own time.
+"""The place of a headset's camera and the times of its poses, measured while the head turns.
 
 Poses of a headset's own camera and of its app are in the same world, so the camera's place on the
 rig is the same however the head moves. A hand at rest stays where it is in the world. Both hold
@@ -37,9 +37,9 @@ STAMP_ADVICE = (
     "stamp each pose with the time that it is for: of a predicted pose, that of display; if the "
     "stamps are right, the camera's latency is not the assumed one"
 )
-_CAMERA_OFFSETS_S = 0.01 * np.arange(-30, 31)
+_CAMERA_OFFSETS_S = np.asarray(0.01 * np.arange(-30, 31), np.float64)
 _STAMP_STEP_S = 0.004
-_STAMP_OFFSETS_S = _STAMP_STEP_S * np.arange(-30, 31)
+_STAMP_OFFSETS_S = np.asarray(_STAMP_STEP_S * np.arange(-30, 31), np.float64)
 _LEAST_SEEN = 30
 _LEAST_TURN_RAD = np.radians(10.0)
 _REACH_M = 0.5

@@ -399,7 +399,8 @@ class Station(Closable):
         if frame is not None:
             self._frame, self.calibration.camera = frame, self._feed.status.identity
         try:
-            self.plan.advance(frame, is_held=self.holds_plan)
+            with suppress(FileError):  # `_store_waiting` reports it
+                self.plan.advance(frame, is_held=self.holds_plan)
         except LinkError as error:
             self._not_applied = str(error)
         # An automatic plan sends them again at once; the reason lasts until it has succeeded.
@@ -450,7 +451,8 @@ class Station(Closable):
         LinkError
             If the link is closed.
         """
-        self.plan.advance(None, is_pressed=True)
+        with suppress(FileError):  # the step is done anyway
+            self.plan.advance(None, is_pressed=True)
         step = self.plan.step
         if step is None:
             raise ProcedureError("wait for the camera's first frame")

@@ -15,7 +15,6 @@ from PySide6.QtCore import QObject, Signal
 from handcal.bridge.bridges import BridgeSettings, open_bridges
 from handcal.calibration.procedure import Calibration
 from handcal.core.errors import FileError, HandcalError
-from handcal.session.library import summarize
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
 from handcal_gui.app.translation import tr
@@ -151,7 +150,7 @@ class EngineThread(Worker):
             _LOG.exception("the engine failed unexpectedly")
             advice = tr("nothing was recorded: start again")
             snapshot, _ = self._newest
-            if snapshot is not None and summarize(snapshot.record).is_worth_resuming:
+            if snapshot is not None and snapshot.record.is_worth_resuming:
                 advice = tr("the session is kept: resume it")
             why = tr("handcal hit an unexpected error ({}); {}").format(_describe(error), advice)
         self._emit_later(self.ended.emit, why)

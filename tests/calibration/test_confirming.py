@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -45,7 +46,7 @@ def test_advice_begins_above_three_degrees_and_ends_clearly_below(stage: Stage) 
     ):
         seen = stage.see(T_D_HAND @ rigid([0.0, 0.0, np.radians(angle_deg)]))
         assert not seen.is_over_limit
-        eventually(lambda prompt=prompt: stage.shown().prompt == prompt)
+        eventually(partial(lambda text: stage.shown().prompt == text, prompt))
         stage.t_ns += ADVISE_EVERY_NS // 2
         stage.see(T_D_TURNED)  # too soon after the last advice
         assert stage.shown().prompt == prompt

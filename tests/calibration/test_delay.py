@@ -13,10 +13,11 @@ from handcal.calibration.hands import PlacedHand
 from handcal.camera.clock import FrameClock
 from handcal.core.errors import PoseError, PosePendingError
 from handcal.core.geometry import rigid
-from handcal.core.types import Float64, Frame, HandCloud, Intrinsics
+from handcal.core.types import Float64, Frame, Intrinsics
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
+from tests.calibration.test_hands import cloud
 
 CAMERA = Intrinsics(320, 180, 251.0, 251.0, 159.5, 89.5)
 T_H_D = rigid([0.02, -0.03, 0.01], [0.0, -0.05, 0.03])
@@ -156,16 +157,4 @@ def test_uncertain_times_move_a_hand_by_the_speeds_of_head_and_hand() -> None:
 
 def placed(t_ns: int) -> PlacedHand:
     points_m = np.array([[0.0, 0.0, 0.5]])
-    cloud = HandCloud(
-        t_camera_ns=t_ns,
-        t_host_ns=t_ns,
-        points_m=points_m.astype(np.float32),
-        is_cut=np.zeros(1, np.bool_),
-        colors=None,
-        contour_m=points_m.astype(np.float32),
-        contour_is_cut=np.zeros(1, np.bool_),
-        mask=np.zeros((2, 2), np.uint8),
-        box_px=(0, 0, 1, 1),
-        median_depth_m=0.5,
-    )
-    return PlacedHand(cloud, t_ns, np.eye(4), points_m, points_m[0])
+    return PlacedHand(cloud(), t_ns, np.eye(4), points_m, points_m[0])

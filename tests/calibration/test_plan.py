@@ -377,3 +377,16 @@ def test_a_request_outlives_results_that_are_solved_for_another_reason(
     planned.stage.calibration.set_eye_distance(EyeDistance(0.063))
     planned.until(StepName.SOLVE)
     assert planned.until(StepName.CURSOR).eyes == ("right",)
+
+
+def test_a_cursor_that_was_withdrawn_makes_no_cursor_of_a_forgotten_hand(
+    make: Callable[..., Planned],
+) -> None:
+    planned = make()
+    planned.until(StepName.ALIGN)
+    observation = planned.plan.observation
+    assert observation is not None
+    planned.stage.calibration.redo()
+    planned.plan.observation = replace(observation, is_steady=True)
+    planned.plan.advance(None, is_pressed=True)
+    assert planned.step.name is StepName.RAISE

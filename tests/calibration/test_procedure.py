@@ -303,7 +303,7 @@ def test_what_the_disk_did_not_take_is_kept_and_stored_later(
 
 
 def test_a_full_session_says_so_before_the_wearer_aligns(stage: Stage, session: Session) -> None:
-    session._state.alignments._limit = 1
+    session._state.alignments.limit = 1
     stage.align()
     stage.calibration.redo()
     stage.calibration.restore_alignment(1)  # a deleted one would not count

@@ -10,16 +10,18 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 
 from handcal.calibration.states import State
 from handcal.camera.camera import Camera
 from handcal.core.errors import CameraError, CameraTimeoutError, HandcalError
-from handcal.core.types import EYES, Frame
+from handcal.core.types import EYES, Frame, Rig
 from handcal.io.closable import Closable
+from handcal.sim.simulation import Simulation
 from handcal.station.settings import StationSettings
-from handcal.station.station import Station
+from handcal.station.station import Station, open_camera
 from tests.campaigns.campaign import Tally, campaign
 from tests.helpers import write_small_rig
 
@@ -98,16 +100,16 @@ class FaultyCamera(Closable):
         self._camera.close()
 
 
-class FaultyStation(Station):
-    """A station with that camera, opened again after it was unplugged."""
+class FaultyPort:
+    """Opens that camera in place of a station's own, and again after it was unplugged."""
 
     camera: FaultyCamera | None = None
 
-    def _open_camera(self) -> Camera:
+    def open(self, settings: StationSettings, simulation: Simulation | None, rig: Rig) -> Camera:
         if self.camera is not None and self.camera.fault == "unplugged":
             raise CameraError("no camera was found")
         fault = "" if self.camera is None else self.camera.fault
-        self.camera = FaultyCamera(super()._open_camera())
+        self.camera = FaultyCamera(open_camera(settings, simulation, rig))
         self.camera.fault = fault
         return self.camera
 
@@ -118,24 +120,26 @@ def attack(tally: Tally, is_short: bool) -> None:
     with tempfile.TemporaryDirectory() as folder:
         rig = write_small_rig(Path(folder) / "rig.yaml")
         settings = StationSettings(seed=3, rig=str(rig), sessions=folder)
-        with FaultyStation(settings, "faults") as station:
+        port = FaultyPort()
+        opened = patch("handcal.station.station.open_camera", port.open)
+        with opened, Station(settings, "faults") as station:
             _watch(station, RECOVERY_S, tally, "the start", until_frame=True)
             for name in names:
                 tally.tried += 1
-                assert station.camera is not None
-                station.camera.fault = name
+                assert port.camera is not None
+                port.camera.fault = name
                 said = _watch(station, SHORT_SECONDS if is_short else SECONDS, tally, name)
                 told = TRUTHS.get(name)
                 if told and not any(told in one for one in said):
                     tally.fail(f"{name}: not told; said: {sorted(said)}")
                 tally.seen["told"] += bool(said)
-                assert station.camera is not None
-                station.camera.fault = ""
+                assert port.camera is not None
+                port.camera.fault = ""
                 _watch(station, RECOVERY_S, tally, f"after {name}", until_frame=True)
 
 
 def _watch(
-    station: FaultyStation, seconds: float, tally: Tally, where: str, until_frame: bool = False
+    station: Station, seconds: float, tally: Tally, where: str, until_frame: bool = False
 ) -> set[str]:
     """Step for some time; return what the station said. With `until_frame`, wait for one."""
     calibration = station.calibration

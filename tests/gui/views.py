@@ -24,7 +24,7 @@ from handcal_gui.calibrate.guide.view import Action, Step, WizardView
 
 RECOMMENDED = PlanSettings("recommended", is_automatic=True)
 _ZERO = (0.0, 0.0, 0.0)
-NUDGED = VerifyingView("left", NudgeSum(3.0, -4.0, 0.01), _ZERO, _ZERO, True, False)
+NUDGED = VerifyingView("left", NudgeSum(3.0, -4.0, 0.01), _ZERO, _ZERO, can_undo=True)
 PLANNED: dict[StepName, tuple[State, tuple[Eye, ...]]] = {
     StepName.RAISE: (State.SHOW_HAND, ("left",)),
     StepName.CURSOR: (State.APPLIED, ("right",)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,8 @@ from hypothesis import strategies as st
 from handcal.core.errors import FileError
 from handcal.core.types import Alignment
 from handcal.rig.example import example_rig
+from handcal.session.alignment_file import decode_alignment
+from handcal.session.library import read_library
 from handcal.session.repair import check_session, repair_session
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
@@ -165,8 +167,7 @@ def test_a_repaired_session_is_sound_and_holds_what_could_be_read(
 
 @pytest.mark.parametrize("line", range(1, 15))
 def test_every_line_costs_only_itself(sound: SessionRecord, tmp_path: Path, line: int) -> None:
-    path = tmp_path / "session"
-    shutil.copytree(sound.path, path)
+    path = Path(shutil.copytree(sound.path, tmp_path / "session"))
     lines = (path / "journal.jsonl").read_bytes().split(b"\n")
     lines[line - 1] = lines[line - 1].replace(b'"time": "2', b'"time": "3')
     (path / "journal.jsonl").write_bytes(b"\n".join(lines))
@@ -182,8 +183,7 @@ def test_every_line_costs_only_itself(sound: SessionRecord, tmp_path: Path, line
 def test_lines_that_are_missing_or_in_another_order_are_named(
     sound: SessionRecord, tmp_path: Path
 ) -> None:
-    path = tmp_path / "session"
-    shutil.copytree(sound.path, path)
+    path = Path(shutil.copytree(sound.path, tmp_path / "session"))
     journal = path / "journal.jsonl"
     lines = journal.read_bytes().splitlines(keepends=True)
     for changed, what in (
@@ -197,8 +197,7 @@ def test_lines_that_are_missing_or_in_another_order_are_named(
 
 
 def test_notes_that_vanish_are_named(sound: SessionRecord, tmp_path: Path) -> None:
-    path = tmp_path / "session"
-    shutil.copytree(sound.path, path)
+    path = Path(shutil.copytree(sound.path, tmp_path / "session"))
     (path / "notes.txt").unlink()
     assert [damage.file for damage in Session.open(path).damaged] == ["notes.txt"]
 
@@ -223,8 +222,7 @@ def test_a_crash_leaves_the_old_or_the_new_notes(tmp_path: Path) -> None:
 
 
 def test_a_rig_is_read_from_the_journal_or_given(sound: SessionRecord, tmp_path: Path) -> None:
-    path = tmp_path / "session"
-    shutil.copytree(sound.path, path)
+    path = Path(shutil.copytree(sound.path, tmp_path / "session"))
     (path / "rig.yaml").write_text("nonsense")
     assert canonical(Session.open(path).rig) == canonical(sound.rig)
     journal = path / "journal.jsonl"
@@ -243,8 +241,7 @@ def test_a_rig_is_read_from_the_journal_or_given(sound: SessionRecord, tmp_path:
 def test_a_repaired_session_goes_on(
     sound: SessionRecord, tmp_path: Path, alignment: Alignment
 ) -> None:
-    path = tmp_path / "session"
-    shutil.copytree(sound.path, path)
+    path = Path(shutil.copytree(sound.path, tmp_path / "session"))
     (path / "alignments/1.npz").unlink()
     before = {file: file.read_bytes() for file in path.rglob("*") if file.is_file()}
     repaired = repair_session(path, tmp_path / "repaired")
@@ -266,3 +263,24 @@ def test_a_journal_can_be_checked_as_its_page_says(monkeypatch: pytest.MonkeyPat
     exec(code, {})
     with pytest.raises(AssertionError):
         exec(code.replace("-47", "-46"), {})
+
+
+def test_a_sound_alignment_of_another_place_is_noticed(
+    tmp_path: Path, alignment: Alignment
+) -> None:
+    """Files swapped within a session, or copied from another, are whole but not the journal's."""
+    other = replace(alignment, t_b_ns=alignment.t_b_ns + 1)
+    with Session.create(tmp_path, example_rig(), {}, name="one") as session:
+        session.save_alignment(alignment)
+        session.save_alignment(other)
+    first, second = (session.path / "alignments" / f"{number}.npz" for number in (1, 2))
+    content = first.read_bytes(), second.read_bytes()
+    assert decode_alignment(content[1]).t_b_ns == other.t_b_ns
+    second.write_bytes(content[0])
+    record = Session.open(session.path)
+    assert [damage.file for damage in record.damaged] == ["alignments/2.npz"]
+    assert set(record.alignments) == {1}
+    first.write_bytes(content[1])
+    assert len(Session.open(session.path).damaged) == 2
+    (entry,) = read_library(tmp_path)
+    assert entry.damaged == 2

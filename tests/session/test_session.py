@@ -15,7 +15,7 @@ from handcal.session.session import (
     Session,
     SessionRecord,
 )
-from handcal.session.state import MAX_TRIALS, WENT_BACK, SessionEvent
+from handcal.session.state import MAX_TRIALS, VERIFYING, WENT_BACK, SessionEvent
 from handcal.session.trial import Trial, trial_json
 from tests.session.conftest import RESULTS, SETTINGS, SHIFT_M
 
@@ -317,3 +317,10 @@ def test_no_log_has_the_wearer_s_name(tmp_path: Path, caplog: pytest.LogCaptureF
         session.save_notes("sits well")
     Session.open(session.path)
     assert "Zdenka" not in caplog.text
+
+
+def test_a_verification_only_begun_is_worth_resuming(session: Session) -> None:
+    session.record("cursor_made")
+    assert not Session.open(session.path).is_worth_resuming
+    session.record(VERIFYING, eye="left")
+    assert Session.open(session.path).is_worth_resuming

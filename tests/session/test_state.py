@@ -164,13 +164,25 @@ def test_impossible_values_are_refused() -> None:
             make()
 
 
-def test_results_go_with_another_eye_distance_only(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("facts", "is_kept"),
+    [
+        ({"plan": "both", "eye_distance": EyeDistance(0.063)}, True),
+        ({"eye_distance": EyeDistance(0.064)}, False),
+        ({"usable_eyes": ("left",)}, False),
+        ({"verified": FACTS["verified"]}, False),
+    ],
+)
+def test_results_go_with_a_fact_that_changes_them(
+    tmp_path: Path, facts: dict[str, Any], is_kept: bool
+) -> None:
     with Session.create(tmp_path, example_rig(), {}) as session:
-        for distance, is_kept in ((EyeDistance(0.063), True), (EyeDistance(0.064), False)):
-            session.save_facts(eye_distance=EyeDistance(0.063))
-            session.save_results({})
-            session.save_facts(plan="both", eye_distance=distance)
-            record = Session.open(session.path)
-            assert (record.is_solved, record.results is not None) == (is_kept, is_kept)
-            assert (session.path / "results.json").exists() == is_kept
-            assert not record.damaged
+        session.save_facts(eye_distance=EyeDistance(0.063))
+        session.save_results({})
+        session.save_applied({"left": [0.0, 0.0, 0.0]})
+        session.save_facts(**facts)
+        record = Session.open(session.path)
+        held = record.is_solved, record.is_applied, record.results is not None
+        assert held == (is_kept, is_kept, is_kept)
+        assert (session.path / "results.json").exists() == is_kept
+        assert not record.damaged

@@ -23,10 +23,12 @@ from handcal.session.trial import (
     Answer,
     Comparison,
     Drawing,
+    EyeTrials,
     Trial,
     calibration_numbers,
     comparison_json,
     count_comparisons,
+    is_doubted,
     make_trial,
     read_comparisons,
     read_trial,
@@ -234,3 +236,14 @@ def test_the_sign_test_is_that_of_the_binomial_distribution() -> None:
     assert sign_test(10, 0) == sign_test(0, 10) == 2 / 2**10
     assert sign_test(2000, 0) == 0.0
     assert sign_test(8, 2) == 2 * (1 + 10 + comb(10, 2)) / 2**10
+
+
+@pytest.mark.parametrize(
+    ("verdict", "mean_arcmin", "doubted"),
+    [("accept", 8.1, True), ("accept", 8.0, False), ("repeat", 20.0, False)],
+)
+def test_trials_over_the_target_contradict_an_acceptance(
+    verdict: str, mean_arcmin: float, doubted: bool
+) -> None:
+    assert is_doubted(verdict, EyeTrials(3, mean_arcmin, 8.0)) is doubted
+    assert not is_doubted(verdict, None)

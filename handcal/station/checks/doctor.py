@@ -177,12 +177,11 @@ def _examples() -> Finding:
 
 
 def _hand_detector() -> Finding:
-    try:
-        detector = load_detector()
-    except HandcalError as error:
-        advice = f"hands are found by depth alone; {_install_again()}"
-        return Finding("Hand detector", Health.LIMITED, str(error), advice)
-    return Finding("Hand detector", Health.GOOD, f"runs {detector.model.name}")
+    def load() -> str:
+        return f"runs {load_detector().model.name}"
+
+    advice = f"hands are found by depth alone; {_install_again()}"
+    return _try("Hand detector", load, advice, Health.LIMITED)
 
 
 def _network() -> Finding:
@@ -199,12 +198,12 @@ def _network() -> Finding:
 
 
 def _pairing() -> Finding:
-    try:
+    def read() -> str:
         read_pairing_key()
-    except HandcalError as error:
-        advice = "only handcal headset needs it; the desktop program has its own key"
-        return Finding("Pairing key", Health.LIMITED, str(error), advice)
-    return Finding("Pairing key", Health.GOOD, f"set in {KEY_VARIABLE}")
+        return f"set in {KEY_VARIABLE}"
+
+    advice = "only handcal headset needs it; the desktop program has its own key"
+    return _try("Pairing key", read, advice, Health.LIMITED)
 
 
 def _rig(path: Path | None) -> list[Finding]:
@@ -304,8 +303,10 @@ def examine_disk(folder: Path) -> Finding:
     return Finding("Disk", Health.GOOD, found)
 
 
-def _try(what: str, look: Callable[[], str], advice: str) -> Finding:
+def _try(
+    what: str, look: Callable[[], str], advice: str, otherwise: Health = Health.BROKEN
+) -> Finding:
     try:
         return Finding(what, Health.GOOD, look())
     except HandcalError as error:
-        return Finding(what, Health.BROKEN, str(error), advice)
+        return Finding(what, otherwise, str(error), advice)

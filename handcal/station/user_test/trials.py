@@ -26,7 +26,7 @@ class Trials:
     """Shows targets and other drawings in the headset, and saves trials and comparisons.
 
     In a blinded comparison the headset draws with two φ in random order, and the wearer chooses.
-    The order is told only to the journal.
+    Only the journal knows the order.
 
     A trial measures and does not change the calibration: while a target is shown, φ moved by hand
     is not stored, and after each trial the headset draws with the calibrated φ again.

@@ -21,7 +21,6 @@ from handcal.bridge.bridges import Bridge, BridgeSettings
 from handcal.calibration.states import ProcedureError
 from handcal.core.errors import FileError
 from handcal.io.closable import Closable
-from handcal.session.state import SessionFacts
 from handcal.station.station import Station
 from handcal_gui.engine.engine_thread import EngineThread
 
@@ -160,20 +159,17 @@ def test_a_station_that_cannot_be_opened_says_why(qtbot: QtBot) -> None:
 
 
 @pytest.mark.parametrize(
-    ("held", "advice"),
+    ("is_worth_resuming", "advice"),
     [
-        ({}, "nothing was recorded: start again"),
-        ({"alignments": {1: "one"}}, "the session is kept: resume it"),
-        ({"facts": SimpleNamespace(verified={"left": "it"})}, "the session is kept: resume it"),
+        (False, "nothing was recorded: start again"),
+        (True, "the session is kept: resume it"),
     ],
 )
 def test_an_engine_that_breaks_down_closes_the_station_and_says_so(
-    qtbot: QtBot, held: dict[str, Any], advice: str
+    qtbot: QtBot, is_worth_resuming: bool, advice: str
 ) -> None:
     station = FakeStation()
-    nothing = {"alignments": {}, "trials": {}, "facts": SessionFacts(), "events": ()}
-    nothing |= {"path": Path("session"), "wearer": "", "damaged": ()}
-    station.record = SimpleNamespace(**{**nothing, **held})
+    station.record = SimpleNamespace(is_worth_resuming=is_worth_resuming)
     station.breaks_at = 5
     engine = EngineThread(lambda: cast(Station, station))
     with qtbot.waitSignal(engine.ended, timeout=5000) as ended:

@@ -6,7 +6,6 @@ import os
 import shutil
 import socket
 import sys
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -67,10 +66,7 @@ def find(part: Part, settings: StationSettings, key: str = KEY) -> Finding:
 
 
 def test_the_simulator_needs_nothing(settings: StationSettings) -> None:
-    check_station(settings, "")
-    started_s = time.thread_time()
     findings = check_station(settings, "")
-    assert time.thread_time() - started_s < 0.2
     assert {finding.health for finding in findings.values()} == {Health.GOOD}
     assert is_ready(findings)
     assert "HoloLens 1" in findings["rig"].found
@@ -140,27 +136,6 @@ def test_a_source_names_the_camera(source: str, expected: dict[str, Any]) -> Non
     assert with_source(own, source).calibration == own.calibration
 
 
-def test_a_hololens_needs_its_address_and_others_their_libraries(
-    settings: StationSettings, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    libraries = {"pyorbbecsdk": object()}
-    monkeypatch.setattr("handcal.station.checks.preflight.find_spec", libraries.get)
-    oak = find("camera", replace(settings, source="oak", headset="network"))
-    assert oak.health is Health.BROKEN
-    assert oak.found == "the library of the OAK-D, depthai, is missing"
-    assert oak.advice == "install it: pip install 'handcal[oak]'"
-    live = replace(settings, source="hololens2", headset="network")
-    assert find("camera", live).found == "no HoloLens 2 is chosen"
-    there = replace(live, hololens2=HoloLens2Settings("192.168.1.7"))
-    by_number = replace(live, source="orbbec", serial="AB1")
-    assert find("camera", by_number).found == "Orbbec camera AB1, not tried yet"
-    finding = find("camera", there)
-    assert finding.found == "HoloLens 2 AHAT at 192.168.1.7, not tried yet"
-    assert finding.health is Health.LIMITED
-    plugged_in = replace(live, hololens2=HoloLens2Settings("hl", realsense_rig="rig.yaml"))
-    assert find("camera", plugged_in).found == "RealSense on the HoloLens 2 at hl, not tried yet"
-
-
 def test_a_recording_must_be_there(settings: StationSettings, tmp_path: Path) -> None:
     played = replace(settings, source="recording")
     assert find("camera", played).found == "no recording is chosen"
@@ -219,33 +194,58 @@ def test_another_camera_than_the_rig_s_is_reported(
     assert "the rig: focal length 4.0 % shorter" in find("camera", played).found
 
 
-def test_a_real_hand_needs_a_real_headset(settings: StationSettings, tmp_path: Path) -> None:
-    recorded = replace(settings, source="recording", recording=str(tmp_path / "hand.db3"))
-    assert find("headset", recorded).health is Health.LIMITED
-    assert find("rig", recorded).health is Health.GOOD
-    networked = replace(recorded, headset="network")
-    networked_finding = find("headset", networked)
-    assert networked_finding.health is Health.LIMITED
-    assert "not connected yet" in networked_finding.found
-    assert str(settings.port) in find("headset", networked).found
-    assert find("rig", networked).health is Health.LIMITED  # the example's
-    own = replace(networked, rig=str(resource_path("example_rig.yaml")))
-    assert find("rig", own).health is Health.GOOD
+LIVE: dict[str, Any] = {"source": "realsense", "headset": "network"}
+HOLOLENS: dict[str, Any] = {"source": "hololens2", "headset": "network"}
+
+
+@pytest.mark.parametrize(
+    ("part", "changes", "health", "said"),
+    [
+        ("camera", LIVE | {"source": "oak"}, Health.BROKEN, "pip install 'handcal[oak]'"),
+        ("camera", LIVE | {"source": "orbbec", "serial": "AB1"}, Health.LIMITED, "camera AB1"),
+        ("camera", HOLOLENS, Health.BROKEN, "no HoloLens 2 is chosen"),
+        (
+            "camera",
+            HOLOLENS | {"hololens2": HoloLens2Settings("10.0.0.7")},
+            Health.LIMITED,
+            "AHAT at 10.0.0.7",
+        ),
+        (
+            "camera",
+            HOLOLENS | {"hololens2": HoloLens2Settings("hl", realsense_rig="rig.yaml")},
+            Health.LIMITED,
+            "RealSense on the HoloLens 2 at hl",
+        ),
+        ("headset", {"source": "recording"}, Health.LIMITED, "cannot see a real hand"),
+        ("headset", {"headset": "network"}, Health.BROKEN, "simulator"),
+        ("headset", LIVE | {"host": "pc"}, Health.BROKEN, "'pc' is not an address"),
+        ("headset", LIVE | {"port": 70_000}, Health.BROKEN, "70000"),
+        ("headset", LIVE, Health.LIMITED, "not connected yet"),
+        ("rig", {"source": "recording"}, Health.GOOD, ""),
+        ("rig", LIVE, Health.LIMITED, "this headset's own"),
+        ("rig", LIVE | {"rig": str(resource_path("example_rig.yaml"))}, Health.GOOD, ""),
+    ],
+)
+def test_each_part_says_what_it_lacks(
+    settings: StationSettings,
+    monkeypatch: pytest.MonkeyPatch,
+    part: Part,
+    changes: dict[str, Any],
+    health: Health,
+    said: str,
+) -> None:
+    monkeypatch.setattr(preflight, "devices_by_child", lambda _: [])
+    monkeypatch.setattr(preflight, "find_spec", {"pyorbbecsdk": object()}.get)
+    finding = find(part, replace(settings, **changes))
+    assert finding.health is health
+    assert said in f"{finding.found}; {finding.advice}"
 
 
 def test_a_network_headset_cannot_be_waited_for(
     settings: StationSettings, taken_port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(preflight, "devices_by_child", lambda _: [])
-    assert "simulator" in find("headset", replace(settings, headset="network")).found
-    live = replace(settings, source="realsense", headset="network")
-    assert "cannot listen" in find("headset", replace(live, port=taken_port)).found
-    elsewhere = find("headset", replace(live, host="192.0.2.1"))
-    assert elsewhere.health is Health.BROKEN
-    assert elsewhere.found.endswith("this computer has no such address")
-    assert elsewhere.advice == "enter one of its own, or 0.0.0.0 for all"
-    assert find("headset", replace(live, host="pc")).found == "'pc' is not an address"
-    assert find("headset", replace(live, port=70_000)).found == "70000 is not a valid port"
+    live = replace(settings, **LIVE)
     assert find("headset", live, key="short").found == "the pairing key is too short"
     everywhere = replace(live, host="0.0.0.0")
     monkeypatch.setattr(preflight, "reachable_address", lambda bound: ("192.168.1.20", bound[1]))
@@ -256,6 +256,9 @@ def test_a_network_headset_cannot_be_waited_for(
 
     monkeypatch.setattr(preflight, "reachable_address", fail)
     assert find("headset", everywhere).health is Health.LIMITED
+    assert "cannot listen" in find("headset", replace(live, port=taken_port)).found
+    elsewhere = find("headset", replace(live, host="192.0.2.1"))
+    assert (elsewhere.health, "no such address" in elsewhere.found) == (Health.BROKEN, True)
 
 
 def test_an_unfit_rig_is_named(settings: StationSettings, tmp_path: Path) -> None:

@@ -54,7 +54,7 @@ def test_it_shows_both_in_the_order_of_the_lot_and_stores_the_answer(
     with pytest.raises(ProcedureError, match="both drawings"):
         trials.answer("first")
     for place in ("second", "first"):
-        trials.show_compared(place)  # type: ignore[arg-type]
+        trials.show_compared(place)
         drawn.append(trials.is_offline)
     trials.answer("second")
     assert (trials.compared, trials.has_compared_both, trials.is_offline) == (None, False, False)

@@ -186,7 +186,7 @@ def test_solve_says_which_offline_calibration_is_kept(
 
 def test_a_verification_tells_how_far_the_outline_was_moved(snapshot: Maker) -> None:
     triple = (0.0, 0.0, 0.0)
-    moved = VerifyingView("left", NudgeSum(-3.0, 4.0, -0.006), triple, triple, True, False)
+    moved = VerifyingView("left", NudgeSum(-3.0, 4.0, -0.006), triple, triple, can_undo=True)
     seen = snapshot(
         State.VERIFY, procedure={"verifying": moved, "refusal": "Hold your hand still."}
     )
