@@ -95,15 +95,6 @@ def test_segment_writes_the_hand(
     assert f"{told['points']} points at" in capsys.readouterr().out
 
 
-def test_segment_says_why_it_finds_nothing(
-    fails: Callable[..., tuple[int, str]], pictures: Path
-) -> None:
-    cv2.imwrite(str(pictures / "depth.png"), np.full((360, 640), 20_000, np.uint16))
-    code, error = fails(*segment_arguments(pictures, pictures / "out"))
-    assert code == 1
-    assert "0.35" in error  # the gate's near end
-
-
 def test_the_gate_is_an_option_that_a_recording_keeps(
     handcal: Callable[..., None],
     fails: Callable[..., tuple[int, str]],
@@ -196,11 +187,3 @@ def test_record_sees_the_simulated_hand_until_it_is_interrupted(
     assert "ended: stopped" in capsys.readouterr().out
     handcal("replay", tmp_path / "hand")
     assert "frames show a hand." in capsys.readouterr().out
-
-
-def test_a_folder_that_cannot_be_made_is_one_line(
-    fails: Callable[..., tuple[int, str]], pictures: Path
-) -> None:
-    code, error = fails(*segment_arguments(pictures, pictures / "color.png"))
-    assert code == 1
-    assert "cannot create the folder" in error

@@ -51,10 +51,6 @@ def test_the_paper_misses_the_hands_depth_over_the_displays(results: dict[str, A
     assert _value(results, "bias at φ3") < 1.0
 
 
-def test_the_paper_is_the_slowest(results: dict[str, Any]) -> None:
-    assert _value(results, "paper / consistent") > 5.0
-
-
 def test_a_straight_hand_is_solved_by_every_method_that_knows_how_the_data_are_made(
     results: dict[str, Any],
 ) -> None:

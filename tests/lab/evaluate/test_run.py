@@ -54,11 +54,6 @@ def test_a_user_test_is_evaluated_and_written(sessions: Path, tmp_path: Path) ->
     assert shares == sorted(shares)
 
 
-def test_a_user_test_without_trials_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match="no trial"):
-        run_user_test(UserTestSettings((str(tmp_path / "none"),), str(tmp_path / "results")))
-
-
 def test_results_never_go_into_a_study(sessions: Path, tmp_path: Path) -> None:
     (tmp_path / "study.json").write_text("{}")
     with pytest.raises(FileError, match="holds a study"):
@@ -74,9 +69,9 @@ def test_files_of_the_users_are_never_replaced(sessions: Path, tmp_path: Path, n
     run_user_test(settings)  # its own report may be replaced
     own = tmp_path / "results" / name
     own.write_text("<p>written with handcal")
-    with pytest.raises(FileError, match=f"not of an evaluation, such as {name}: choose another"):
+    with pytest.raises(FileError, match=f"not of an evaluation, such as {name}; choose another"):
         run_user_test(settings)
-    with pytest.raises(FileError, match=f"not of an evaluation, such as {name}: choose another"):
+    with pytest.raises(FileError, match=f"not of an evaluation, such as {name}; choose another"):
         run_noise_study(NoiseStudySettings("quick", output=settings.output), Progress())
     assert own.read_text() == "<p>written with handcal"
 

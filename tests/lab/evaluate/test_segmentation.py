@@ -11,12 +11,10 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from matplotlib.figure import Figure as Canvas
 
 from handcal.camera.images import write_frame
 from handcal.cli.main import main
-from handcal.core.errors import CancelledError, FileError, HandError
-from handcal.core.progress import Progress
+from handcal.core.errors import FileError, HandError
 from handcal.core.types import Frame, HandCloud
 from handcal.hand.segment import segment_hand
 from handcal.hand.settings import SegmentSettings
@@ -29,8 +27,7 @@ from handcal.lab.evaluate.masked_frames import (
     scaled,
     subsampled,
 )
-from handcal.lab.evaluate.segmentation import evaluate_frame, evaluation, run_segmentation_test
-from handcal.lab.settings import SegmentationTestSettings
+from handcal.lab.evaluate.segmentation import evaluate_frame, evaluation
 from handcal.sim.camera import simulated_frame
 
 GATE = SegmentSettings()
@@ -179,20 +176,6 @@ def test_a_folder_is_judged_by_the_command(
     assert read_image(sheet, cv2.IMREAD_COLOR).shape == (320, 4 * 320, 3)
     assert {path.name for path in sheet.parent.glob("report.*")} == {"report.pdf", "report.html"}
     assert "9: no hand-sized object" in capsys.readouterr().out
-
-
-def test_points_at_the_frame_are_drawn_in_full(folder: Path) -> None:
-    report = run_segmentation_test(SegmentationTestSettings(str(folder), "depth")).report
-    axes = Canvas().subplots(1, 2)
-    report.figures[0].draw(axes)
-    assert not any(line.get_clip_on() for ax in axes for line in ax.lines)
-
-
-def test_the_test_can_be_cancelled(folder: Path) -> None:
-    with pytest.raises(CancelledError):
-        run_segmentation_test(
-            SegmentationTestSettings(str(folder), "depth"), Progress(is_cancelled=lambda: True)
-        )
 
 
 @pytest.mark.parametrize(
