@@ -18,7 +18,6 @@ import pytest
 from handcal.camera.folder import record_folder
 from handcal.core.geometry import rigid
 from handcal.core.types import Frame, Intrinsics
-from handcal.rig.formats import write_intrinsics
 from handcal.sim.hand import make_hand
 from handcal.sim.raster import draw_hand
 from handcal.sim.sensor import SensorSettings, sense_depth
@@ -58,17 +57,6 @@ def segment_arguments(pictures: Path, output: object) -> list[object]:
         "--intrinsics", pictures / "camera.json", "--output", output,
         "--roi", "depth",  # the hand has no colour of its own here
     ]  # fmt: skip
-
-
-def test_intrinsics_of_another_program_need_the_scale_of_depth(
-    handcal: Callable[..., None], fails: Callable[..., tuple[int, str]], pictures: Path
-) -> None:
-    write_intrinsics(pictures / "camera.json", CAMERA, "ros")
-    arguments = segment_arguments(pictures, pictures / "hand")
-    assert "must give depth_scale" in fails(*arguments)[1]
-    handcal(*arguments, "--depth-scale", 1e-4)
-    depth_m = json.loads((pictures / "hand/hand.json").read_text())["median_depth_m"]
-    assert depth_m == pytest.approx(0.49, abs=0.02)
 
 
 def test_segment_writes_the_hand(

@@ -148,14 +148,6 @@ def test_a_hand_before_the_real_cube_does_not_make_it_a_drawn_one() -> None:
     assert watched.say(cube_drawn(), DRAWN, 3) == ""
 
 
-def test_what_a_person_took_is_not_taken_again_as_the_next() -> None:
-    watch = RestWatch(CUBE, GRID)
-    watch.took(look(cube_seen(), 1), REAL)
-    said = [watch.consider(look(cube_seen(), n), DRAWN, n * 10**9) for n in range(2, 6)]
-    assert "taken last" in said[-1]
-    assert "" not in said
-
-
 class Film(ViewpointCamera):
     """A camera that sees scenes one after the other, each for a second, at 5 frames a second."""
 

@@ -80,14 +80,6 @@ def test_half_a_mask_is_half_as_good(shot: MaskedFrame) -> None:
     assert row.area_change == pytest.approx(1 / halved - 1, rel=0.1)
 
 
-def test_what_lies_beyond_the_gate_counts_as_lost(shot: MaskedFrame) -> None:
-    whole = shot.is_hand & (shot.frame.depth > 0)
-    near = shot.frame.depth <= np.median(shot.frame.depth[whole])
-    lost = changed(by_depth, lambda cloud: replace(cloud, mask=np.where(near, cloud.mask, 0)))
-    row, _ = evaluate_frame(shot, lambda frame: (lost if frame is shot.frame else by_depth)(frame))
-    assert row.kept == pytest.approx((whole & near).sum() / whole.sum())
-
-
 def test_what_is_refused_is_counted_with_its_reason(shot: MaskedFrame) -> None:
     def refuse(frame: Frame) -> HandCloud:
         raise HandError("too far")
@@ -211,13 +203,6 @@ def test_a_folder_of_no_frames_is_known_before_they_are_read(folder: Path) -> No
     (folder / "meta.json").unlink()
     with pytest.raises(FileError, match=r"holds no meta\.json"):
         read_masked_names(folder)
-
-
-@pytest.mark.parametrize("content", ["{}", '{"../a": {}}', '{"a": 3}', "[]", "no"])
-def test_a_wrong_list_of_frames_is_refused(tmp_path: Path, content: str) -> None:
-    (tmp_path / "meta.json").write_text(content)
-    with pytest.raises(FileError):
-        read_masked_names(tmp_path)
 
 
 def test_an_empty_mask_is_refused(folder: Path) -> None:

@@ -76,12 +76,6 @@ def test_tables_give_means_with_their_intervals(report: Report) -> None:
     assert by_angle["0"][1] == "0.0 (0.0–0.0)"
 
 
-def test_a_section_without_rows_is_left_out(report: Report) -> None:
-    titles = {section.title for section in report.sections}
-    assert {"Rotation", "Hand shape"} <= titles
-    assert not {"Forearm", "Wearer"} & titles
-
-
 def test_figures_hold_the_numbers_that_they_show(report: Report) -> None:
     figures = {figure.name: figure for figure in report.figures}
     assert set(figures) == {"rotation", "rotation-components", "hand-shape"}

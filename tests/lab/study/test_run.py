@@ -229,15 +229,6 @@ def test_a_worker_that_dies_is_reported_and_the_study_continues(tmp_path: Path) 
     assert rows == run_study(make_study(), tmp_path / "other", workers=1)
 
 
-def test_how_much_is_done_is_reported_without_reading_it(tmp_path: Path) -> None:
-    study = make_study()
-    run_study(study, tmp_path, workers=1)
-    chunks = sorted((tmp_path / "chunks").iterdir())
-    chunks[0].unlink()
-    chunks[1].write_bytes(b"damaged")
-    assert share_done(study, tmp_path) == 1.0 - 1.0 / len(chunks)
-
-
 @pytest.mark.parametrize("damage", [b"", b"{", b'{"rows": [[]], "sha256": ""}', b"\xff", None])
 def test_a_damaged_chunk_is_done_again(tmp_path: Path, damage: bytes | None) -> None:
     rows = run_study(make_study(), tmp_path, workers=1)
@@ -277,12 +268,6 @@ def test_no_cluster_there(tmp_path: Path, address: str, monkeypatch: pytest.Monk
     monkeypatch.setattr("handcal.lab.study.run._CONNECT_S", 0.2)
     with pytest.raises(HandcalError, match="no Dask scheduler answers"):
         run_study(make_study(), tmp_path, scheduler=address)
-
-
-def test_dask_is_not_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(HandcalError, match=r"handcal\[cluster\]"):
-        run_study(make_study(), tmp_path, scheduler="tcp://127.0.0.1:9")
 
 
 @pytest.mark.process
