@@ -186,6 +186,7 @@ def test_every_example_is_run_and_has_a_docstring_and_a_main() -> None:
         assert any(isinstance(node, ast.FunctionDef) and node.name == "main" for node in tree.body)
 
 
+@pytest.mark.slow  # tests/bridge has each of them, without a calibration
 def test_a_calibration_is_followed_by_bridges(tmp_path: Path) -> None:
     pytest.importorskip("pylsl")
     pytest.importorskip("pyigtl")
