@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from handcal.cli.output import console, save, show_progress, table, triple, until_interrupted
-from handcal.cli.run import ALIGNMENT_OPTIONS, SENSOR_OPTIONS
+from handcal.cli.run import ALIGNMENT_OPTIONS, CONTRADICTED, SENSOR_OPTIONS
 from handcal.cli.terminal import (
     arg,
     command,
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from handcal.lab.demo import DemoSettings
 
 FAULTS = [fault for fault in get_args(Fault) if fault]
-_CONTRADICTED = 3
 _MEANINGS: Mapping[VerdictName, str] = {
     "accept": "the headset draws with this result, which is within the target and very probably "
     "better than none.",
@@ -147,7 +146,7 @@ def demo(arguments: argparse.Namespace) -> None:
     )
     _say_meaning(result, settings)
     if any(found["verdict"] == "contradicted" for found in result["eyes"].values()):
-        sys.exit(_CONTRADICTED)
+        sys.exit(CONTRADICTED)
 
 
 def _say_contradictions(result: dict[str, Any], settings: DemoSettings) -> None:
@@ -155,7 +154,7 @@ def _say_contradictions(result: dict[str, Any], settings: DemoSettings) -> None:
     for reason in dict.fromkeys(found["reason"] for found in result["eyes"].values()):
         console.print(f"contradicted: {reason}")
     _say_meaning(result, settings)
-    sys.exit(_CONTRADICTED)
+    sys.exit(CONTRADICTED)
 
 
 def _say_meaning(result: dict[str, Any], settings: DemoSettings) -> None:
