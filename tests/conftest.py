@@ -27,8 +27,6 @@ from handcal.sim.hand import make_hand
 hypothesis.settings.register_profile("handcal", deadline=None)
 hypothesis.settings.load_profile("handcal")
 
-gc.disable()  # until all modules are imported and all tests collected: none of that is garbage
-
 # Images of machines turn bytecode off, and then each worker rewrites all assertions in every run.
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -58,7 +56,7 @@ _NOT_QUICK = "window", "process", "slow", "campaign"
 _LONG = {
     "tests/cli/test_accept.py",
     "tests/cli/test_study.py",
-    "tests/lab/bench/test_offline.py",
+    "tests/lab/bench/test_accuracy.py",
     "tests/lab/bench/test_run.py",
     "tests/register/test_consistent.py",
     "tests/rig/boards/test_board.py",
@@ -77,13 +75,9 @@ _SECOND_TRIES = 1
 """Most tests of a run that may need a second try."""
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_collection() -> Generator[None, object, object]:
-    """Collect garbage again, but never look through what was imported and collected."""
-    result = yield
-    gc.enable()
+def pytest_collection_finish() -> None:
+    """Never look for garbage in what was imported and collected: all of it stays."""
     gc.freeze()
-    return result
 
 
 @pytest.hookimpl(tryfirst=True)  # before -m selects

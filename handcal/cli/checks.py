@@ -117,8 +117,6 @@ def _headset_findings(arguments: argparse.Namespace) -> list[Finding]:
     from handcal.station.checks.doctor import examine_headset
 
     pairings = paired_headsets(arguments.keys)
-    if not pairings.all:
-        raise HandcalError("no headset is paired", "pair one with handcal pair")
     rig = read_rig(arguments.rig) if arguments.rig else None
     with ExitStack() as stack:
         server = stack.enter_context(HeadsetServer(pairings, (arguments.host, arguments.port)))

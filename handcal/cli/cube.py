@@ -236,5 +236,5 @@ def _only_camera() -> int:
     cameras = list_viewpoints()
     if len(cameras) != 1:
         there = f"cameras {', '.join(map(str, cameras))} are there" if cameras else "there is none"
-        raise CameraError("say which camera: --camera N", f"{there}")
+        raise CameraError(there, "say which camera: --camera N")
     return cameras[0]

@@ -99,10 +99,7 @@ def network_server(arguments: argparse.Namespace) -> Iterator[HeadsetServer]:
     """Yield the link once a paired headset has connected."""
     from handcal.link.server import HeadsetServer
 
-    pairings = paired_headsets(arguments.keys)
-    if not pairings.all:
-        raise HandcalError("no headset is paired", "pair one with handcal pair")
-    with HeadsetServer(pairings, (arguments.host, arguments.port)) as server:
+    with HeadsetServer(paired_headsets(arguments.keys), (arguments.host, arguments.port)) as server:
         console.print("Waiting for the headset")
         server.wait_connected(arguments.patience_s)
         yield server

@@ -70,7 +70,7 @@ def detector(arguments: argparse.Namespace) -> None:
 
     images = arguments.images or arguments.folder
     if images is None or (arguments.images and arguments.folder):
-        raise HandcalError("no photographs to measure: give one folder, or --images")
+        raise HandcalError("no photographs to measure", "give one folder, or --images")
     conditions = Conditions(arguments.brightness, arguments.hand_height, arguments.glove)
     if arguments.sheet is not None:  # before the long work, whose result would be lost
         require_suffix(arguments.sheet, ".png")

@@ -22,7 +22,7 @@ from handcal.cli.terminal import (
     seed,
     value,
 )
-from handcal.core.errors import LinkError
+from handcal.core.errors import HandcalError, LinkError
 from handcal.io.files import make_folder
 
 if TYPE_CHECKING:
@@ -68,7 +68,8 @@ ALIGNMENT_OPTIONS = (
         help="align both eyes at once, each eye alone, or the only usable eye",
     ),
 )
-_CONTRADICTED = 3
+CONTRADICTED = 3
+"""Exit code of a calibration with evidence against its result."""
 _SHARE = number(float, 0.0, 1.0)
 
 
@@ -166,7 +167,7 @@ def run(arguments: argparse.Namespace) -> None:
         console.print(f"The headset never acknowledged: {listed}")
     console.print(f"Session: {result['session']}")
     if any(found["verdict"] == "contradicted" for found in result["eyes"].values()):
-        sys.exit(_CONTRADICTED)
+        sys.exit(CONTRADICTED)
 
 
 def bridges_of(arguments: argparse.Namespace) -> BridgeSettings:
@@ -186,12 +187,18 @@ def _tell(line: str) -> None:
 
 
 def paired_headsets(path: Path | None) -> Pairings:
-    """Return the headsets that may connect: of a file, or one with the key in the environment."""
+    """Return the headsets that may connect: of a file, or one with the key in the environment.
+
+    Raises HandcalError if there is none.
+    """
     from handcal.link.pairing import KEY_VARIABLE, Pairing, Pairings, pairing_file
 
     key = os.environ.get(KEY_VARIABLE, "")
     if path is not None or not key:
-        return Pairings.read(path or pairing_file())
+        pairings = Pairings.read(path or pairing_file())
+        if not pairings.all:
+            raise HandcalError("no headset is paired", "pair one with handcal pair")
+        return pairings
     try:
         return Pairings((Pairing(key),))
     except ValueError as error:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from handcal.cli.output import console, save, show_progress, table, triple, until_interrupted
-from handcal.cli.run import ALIGNMENT_OPTIONS, SENSOR_OPTIONS
+from handcal.cli.run import ALIGNMENT_OPTIONS, CONTRADICTED, SENSOR_OPTIONS
 from handcal.cli.terminal import (
     arg,
     command,
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from handcal.lab.demo import DemoSettings
 
 FAULTS = [fault for fault in get_args(Fault) if fault]
-_CONTRADICTED = 3
 _MEANINGS: Mapping[VerdictName, str] = {
     "accept": "the headset draws with this result, which is within the target and very probably "
     "better than none.",
@@ -92,11 +91,10 @@ _LINK = (
     _RIG,
     file_option("--worn-rig", "true rig of the simulated headset (default: the same as --rig)"),
     *SENSOR_OPTIONS,
-    arg(
+    flag(
         "--known-fat",
+        "the rig knows how fat the camera's edges are, as from a depth check",
         dest="is_fat_known",
-        action="store_true",
-        help="the rig knows how fat the camera's edges are, as from a depth check",
     ),
     arg(
         "--fault",
@@ -151,7 +149,7 @@ def demo(arguments: argparse.Namespace) -> None:
     )
     _say_meaning(result, settings)
     if any(found["verdict"] == "contradicted" for found in result["eyes"].values()):
-        sys.exit(_CONTRADICTED)
+        sys.exit(CONTRADICTED)
 
 
 def _say_contradictions(result: dict[str, Any], settings: DemoSettings) -> None:
@@ -159,7 +157,7 @@ def _say_contradictions(result: dict[str, Any], settings: DemoSettings) -> None:
     for reason in dict.fromkeys(found["reason"] for found in result["eyes"].values()):
         console.print(f"contradicted: {reason}")
     _say_meaning(result, settings)
-    sys.exit(_CONTRADICTED)
+    sys.exit(CONTRADICTED)
 
 
 def _say_meaning(result: dict[str, Any], settings: DemoSettings) -> None:
@@ -254,9 +252,11 @@ def _next_step(verdict: VerdictName, settings: DemoSettings, session: str) -> st
         "S",
         "stop after this time (default: run until terminated)",
     ),
-    flag("--lose-start", "fault: the first projections never arrive"),
-    flag("--step-clock", "fault: after four seconds its clock is set by 0.3 s"),
-    flag("--stale", "fault: keep drawing with the projections of the wearer before"),
+    flag("--lose-start", "fault: the first projections never arrive", dest="loses_start"),
+    flag("--step-clock", "fault: after four seconds its clock is set by 0.3 s", dest="steps_clock"),
+    flag(
+        "--stale", "fault: keep drawing with the projections of the wearer before", dest="is_stale"
+    ),
     value(
         "--eye-distance-mm",
         number(float, 45.0, 85.0),
@@ -301,28 +301,17 @@ def headset(arguments: argparse.Namespace) -> None:
     else:
         fail("give --port and a pairing key, or --pair", 2)
     x_mm, y_mm, z_mm = arguments.slip_mm
-    settings = HeadsetSettings(
+    settings = settings_of(
+        HeadsetSettings,
+        arguments,
         rig_path=str(_rig_path(arguments.rig)),
         worn_rig_path=str(arguments.worn_rig or ""),
         host=host,
         port=port,
         device_id=device_id,
-        scene_port=arguments.scene_port,
-        seed=arguments.seed,
-        impairment=Impairment(
-            loss=arguments.loss,
-            duplicate=arguments.duplicate,
-            reorder=arguments.reorder,
-            delay_s=arguments.delay_ms / 1e3,
-            seed=arguments.seed,
-        ),
+        impairment=settings_of(Impairment, arguments, delay_s=arguments.delay_ms / 1e3),
         clock_offset_s=arguments.clock_offset_ms / 1e3,
-        duration_s=arguments.duration_s,
-        is_stale=arguments.stale,
-        loses_start=arguments.lose_start,
-        steps_clock=arguments.step_clock,
         eye_distance_m=arguments.eye_distance_mm and arguments.eye_distance_mm / 1e3,
-        side=arguments.side,
         wearer=WearerSettings(slip_m=(x_mm / 1e3, y_mm / 1e3, z_mm / 1e3)),
         has_wearer=not arguments.as_device,
     )

@@ -64,9 +64,9 @@ def folder_option(name: str, purpose: str, **settings: Any) -> Option:
     return arg(name, type=Path, metavar="FOLDER", help=purpose, **settings)
 
 
-def flag(name: str, purpose: str) -> Option:
-    """Return an option that is either given or not."""
-    return arg(name, action="store_true", help=purpose)
+def flag(name: str, purpose: str, **settings: Any) -> Option:
+    """Return an option that is either given or not; the settings are those of `arg`."""
+    return arg(name, action="store_true", help=purpose, **settings)
 
 
 def value(

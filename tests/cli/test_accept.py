@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from handcal.cli.main import parse
-from handcal.core.errors import FileError, HandcalError
+from handcal.core.errors import HandcalError
 from handcal.core.geometry import rigid
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig
@@ -44,25 +44,3 @@ def test_a_right_rig_passes_and_a_turned_camera_fails(
     assert not json.loads(result.read_text())["passed"]
     assert "FAILED" in (images / "page" / "report.html").read_text("utf-8")
     capsys.readouterr()
-
-
-def test_missing_images_are_named(tmp_path: Path) -> None:
-    write_rig(tmp_path / "rig.yaml", example_rig())
-    with pytest.raises(FileError, match=r"camera\.json"):
-        accept(tmp_path, tmp_path / "rig.yaml")
-
-
-def test_the_images_to_practise_with_come_with_all_there_is_to_enter(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    arguments = parse(["rig", "simulate", str(tmp_path / "images"), "--views", "3"])
-    arguments.command(arguments)
-    told = " ".join(capsys.readouterr().out.split())
-    for one in (
-        "ChArUco, 8×6 squares of 25 mm, markers of 16 mm, DICT_5X5_100",
-        "images in depth and headset, intrinsics in depth.json and headset.json",
-        "images of the grid in grid-left, grid squares 80 px",
-        "images of the board in board-right, its poses in tracked-right.json",
-        "measured distance 2 m",
-    ):
-        assert one in told

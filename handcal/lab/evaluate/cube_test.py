@@ -543,8 +543,9 @@ def cube_and_grid(settings: CubeTestSettings, folder: Path) -> tuple[Cube, Grid]
     file = _file(settings.cube, folder / "cube.json")
     if not file.exists():
         raise FileError(
-            f"there is no {file}: choose the description of the cube, or write one together with "
-            "the cube's net by handcal evaluate cube net"
+            f"there is no {file}",
+            "choose the description of the cube, or write one together with the cube's net by "
+            "handcal evaluate cube net",
         )
     display = _rig(settings).eyes[settings.eye]
     return read_cube(file), grid_on(display.width_px, display.height_px, settings.square_px)
@@ -560,7 +561,7 @@ def position_warp(settings: CubeTestSettings, folder: Path, position: str) -> Ro
     """
     file = _file(settings.camera, folder / "camera.json")
     if not file.exists():
-        raise FileError(f"there is no {file}: choose the file of the camera's intrinsics")
+        raise FileError(f"there is no {file}", "choose the file of the camera's intrinsics")
     camera = read_intrinsics(file)
     grid = cube_and_grid(settings, folder)[1]
     return display_warp(folder / position, camera, grid)

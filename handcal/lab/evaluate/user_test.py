@@ -124,8 +124,8 @@ def read_user_test(folders: Iterable[Path], progress: Progress = Progress()) -> 
                 left_out[str(path)] = record.left_out
     if not kept:
         raise FileError(
-            "there is no trial of the user test to evaluate",
-            f"record some first ({_reasons(left_out) or 'no folder'})",
+            f"there is no trial of the user test to evaluate ({_reasons(left_out) or 'no folder'})",
+            "record some first",
         )
     names = Counter(path.name for path in kept)
     sessions = {

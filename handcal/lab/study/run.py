@@ -234,7 +234,7 @@ def _cluster(address: str) -> Iterator[Executor]:
         from distributed.comm.core import connect
     except ImportError as error:
         raise HandcalError(
-            "studies on a cluster need Dask: install it with pip install handcal[cluster]"
+            "studies on a cluster need Dask", "install it with pip install handcal[cluster]"
         ) from error
 
     async def reach() -> None:
