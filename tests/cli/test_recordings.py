@@ -16,7 +16,6 @@ from handcal.cli.recordings import draw_overlay, replayed, write_segmentation
 from handcal.core.errors import CameraEndError
 from handcal.core.geometry import rigid
 from handcal.core.types import CameraIdentity, Float64, Frame, HandCloud, Intrinsics
-from handcal.hand.segment import SegmentSettings
 from handcal.hand.settings import SegmentSettings
 from handcal.io.closable import Closable
 from handcal.sim.hand import HandModel, make_hand
