@@ -13,9 +13,8 @@ from handcal.calibration.procedure import Calibration
 from handcal.core.display import view_of_eye
 from handcal.core.geometry import invert, transform
 from handcal.core.types import EYES, Eye, Float64, Rig
-from handcal.sim.eyes import TrueEyes
 from handcal.sim.scene import SceneState
-from handcal.sim.simulation import Simulation
+from handcal.sim.simulation import Simulation, TrueEyes
 from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.settings import StationSettings
 from handcal.station.wearer_view import EyeView, render_eye_view

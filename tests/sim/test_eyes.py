@@ -7,10 +7,10 @@ from handcal.core.display import eye_projection, view_of_eye
 from handcal.core.geometry import project, rigid, transform
 from handcal.core.types import EYES, Eye, EyeDisplay, Rig
 from handcal.rig.example import example_rig
-from handcal.sim.eyes import TrueEyes
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World
 from handcal.sim.room import make_room
+from handcal.sim.simulation import TrueEyes
 from handcal.sim.wearer import Wearer
 from handcal.sim.wearer_settings import WearerSettings
 
