@@ -55,7 +55,7 @@ def freeze(instance: object, name: str, dtype: DTypeLike, *shape: int | None) ->
 def brief(instance: Any) -> str:
     """Return a dataclass as one line, large arrays by type and shape: a ``__repr__``."""
     values = ", ".join(
-        f"{one.name}={_brief(getattr(instance, one.name))}" for one in fields(instance)
+        f"{field.name}={_brief(getattr(instance, field.name))}" for field in fields(instance)
     )
     return f"{type(instance).__name__}({values})"
 
@@ -75,7 +75,7 @@ def _brief(value: object) -> str:
             return np.array2string(value, precision=6, separator=", ").replace("\n", "")
         return f"{value.dtype} {value.shape}"
     if isinstance(value, Mapping):
-        return f"{{{', '.join(f'{key!r}: {_brief(one)}' for key, one in value.items())}}}"
+        return f"{{{', '.join(f'{key!r}: {_brief(item)}' for key, item in value.items())}}}"
     if isinstance(value, tuple) and len(value) > _FEW:
         return f"<{len(value)} items>"
     if isinstance(value, tuple):

@@ -48,7 +48,7 @@ def rotation_vector(R: Float64) -> Float64:
     axis = 0.5 * (r21 - r12), 0.5 * (r02 - r20), 0.5 * (r10 - r01)
     sine, cosine = math.hypot(*axis), 0.5 * (r00 + r11 + r22 - 1.0)
     scale = math.atan2(sine, cosine) / sine if sine > 0.0 else 1.0
-    return np.array([scale * one for one in axis])
+    return np.array([scale * part for part in axis])
 
 
 def is_rigid(T: Float64, reach_m: float, tolerance: float = _ROTATION_TOLERANCE) -> bool:

@@ -48,7 +48,7 @@ class Progress:
     def check(self) -> None:
         """Raise CancelledError if the task is to end."""
         if self.is_cancelled():
-            raise CancelledError("cancelled", "nothing has changed")
+            raise CancelledError("cancelled: nothing has changed")
 
     def part(self, low: float, high: float, what: str = "") -> Progress:
         """Return the progress of a part of this task, given as shares of it."""

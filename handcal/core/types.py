@@ -389,7 +389,7 @@ class Verification:
     def __post_init__(self) -> None:
         places = (*self.before_m, *self.after_m, *(self.hand_E_m or ()))
         moves = *self.nudge_arcmin, *self.offset_arcmin, self.nudge_size, self.offset_size
-        if not all(abs(one) < _MOST_VERIFIED for one in (*places, *moves)):
+        if not all(abs(number) < _MOST_VERIFIED for number in (*places, *moves)):
             raise ValueError("a verification's numbers are too large")
         if self.outline_sigma_px is not None and not 0.0 <= self.outline_sigma_px < _MOST_VERIFIED:
             raise ValueError(f"Verification.outline_sigma_px: {self.outline_sigma_px} is no σ")

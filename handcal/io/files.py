@@ -226,21 +226,14 @@ def make_folder(path: Path, inside: Path | None = None) -> Path:
 
 def require_writable(folder: Path) -> None:
     """Raise FileError if no file can be written to a folder, which need not exist yet."""
-    if (problem := folder_problem(folder)) is not None:
-        raise FileError(": ".join(problem))
-
-
-def folder_problem(folder: Path) -> tuple[str, str] | None:
-    """Return why `require_writable` would refuse a folder, and what to do; None if it would not."""
     folder = folder.absolute()
     there = next(path for path in (folder, *folder.parents) if os.path.exists(path))
     if not there.is_dir():
-        return f"{there} is a file", "choose a folder"
+        raise FileError(f"{there} is a file", "choose a folder")
     if not os.access(there, os.W_OK | os.X_OK):
-        return f"cannot write to {there}", "choose another folder"
+        raise FileError(f"cannot write to {there}", "choose another folder")
     if shutil.disk_usage(there).total == 0:  # such as /proc, which lets its owner write
-        return f"nothing can be stored in {there}", "choose another folder"
-    return None
+        raise FileError(f"nothing can be stored in {there}", "choose another folder")
 
 
 def write_json(path: Path, value: object) -> None:

@@ -53,9 +53,10 @@ class FileLock:
             holder = (file.read(_MOST_BYTES) or b"").strip(b"\0").decode(errors="replace")
         except OSError as error:
             is_gone = isinstance(error, FileNotFoundError)
-            advice = "" if is_gone else "; make it writable, or use a copy of it elsewhere"
-            why = error.strerror or error
-            raise FileError(f"cannot lock {path.parent}: {why}{advice}") from error
+            advice = "" if is_gone else "make it writable, or use a copy of it elsewhere"
+            raise FileError(
+                f"cannot lock {path.parent}: {error.strerror or error}", advice
+            ) from error
         if holder.strip("0123456789"):
             file.close()
             raise FileError(

@@ -46,7 +46,7 @@ def read_settings(kind: type[Settings], data: object, where: str = "settings") -
     unknown = sorted(str(name) for name in set(data) - names)
     if unknown:
         shown = ", ".join(name or "field without a name" for name in unknown)
-        raise FileError(f"{where} has no {shown}", f"it has {', '.join(sorted(names))}")
+        raise FileError(f"{where} has no {shown}, only {', '.join(sorted(names))}")
     values = {name: _convert(hints[name], value, f"{where}.{name}") for name, value in data.items()}
     try:
         return kind(**values)
@@ -64,7 +64,7 @@ def _convert(kind: Any, value: object, where: str) -> Any:
     if origin in (Union, types.UnionType):
         if value is None and type(None) in choices:
             return None
-        texts = [text for one in choices if get_origin(one) is Literal for text in get_args(one)]
+        texts = [text for kind in choices if get_origin(kind) is Literal for text in get_args(kind)]
         if isinstance(value, str) and value in texts:
             return value
         return _convert(

@@ -5,7 +5,6 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from handcal.core.conventions import (
-    Pose,
     opengl_projection,
     opengl_transform,
     openxr_view,
@@ -54,20 +53,6 @@ def pixels_from_clip(clip: Float64, projection: Projection) -> Float64:
 
 def homogeneous(points: Float64) -> Float64:
     return np.column_stack([points, np.ones(len(points))])
-
-
-def test_opengl_projection_on_the_axis_by_hand() -> None:
-    # 2f/w = 200/200, 2f/h = 200/100, -(3+1)/(3-1) = -2, -2·3·1/(3-1) = -3
-    M = opengl_projection(simple_projection(), near_m=1.0, far_m=3.0)
-    expected = [[1, 0, 0, 0], [0, 2, 0, 0], [0, 0, -2, -3], [0, 0, -1, 0]]
-    np.testing.assert_allclose(M, expected, atol=1e-15)
-
-
-def test_opengl_projection_off_the_axis_by_hand() -> None:
-    # The axis meets the image at (150, 25) of (200, 100) from its top left corner, which is
-    # (0.5, 0.5) in NDC; the third column multiplies z_GL = -depth, hence the sign.
-    M = opengl_projection(simple_projection(cx=149.5, cy=24.5), near_m=1.0, far_m=3.0)
-    np.testing.assert_allclose(M[:2], [[1, 0, -0.5, 0], [0, 2, -0.5, 0]], atol=1e-15)
 
 
 def test_opengl_projection_of_a_moved_eye_by_hand() -> None:
@@ -138,24 +123,11 @@ def test_poses_by_hand() -> None:
     np.testing.assert_allclose(openxr.quaternion_xyzw, [0, -HALF, 0, HALF], atol=1e-15)
 
 
-def test_roll_by_hand() -> None:
-    # Right turns to down, where Unity and OpenXR turn right to up about their z: a negative turn.
-    T = rigid([0.0, 0.0, QUARTER])
-    for converted in (unity_transform(T), opengl_transform(T)):
-        np.testing.assert_allclose(pose(converted).quaternion_xyzw, [0, 0, -HALF, HALF], atol=1e-15)
-
-
 @given(POSES, POSES)
 def test_conversions_keep_products_and_undo_themselves(A: Float64, B: Float64) -> None:
     for convert in (opengl_transform, unity_transform):
         np.testing.assert_allclose(convert(A) @ convert(B), convert(A @ B), atol=1e-12)
         np.testing.assert_array_equal(convert(convert(A)), A)
-
-
-@given(POSES)
-def test_unity_is_opengl_mirrored(T: Float64) -> None:
-    S = np.diag([1.0, 1.0, -1.0, 1.0])
-    np.testing.assert_array_equal(unity_transform(T), S @ opengl_transform(T) @ S)
 
 
 @given(st.sampled_from(EYES), SHIFTS, POSES)
@@ -179,11 +151,6 @@ def test_openxr_angles_by_hand() -> None:
     np.testing.assert_allclose(at.quaternion_xyzw, [0, 0, 0, 1])
     angles = np.tan([fov.left_rad, fov.right_rad, fov.up_rad, fov.down_rad])
     np.testing.assert_allclose(angles, [-1.5, 0.5, 0.25, -0.75])
-
-
-def test_openxr_puts_the_moved_eye_at_the_shift() -> None:
-    at, _ = openxr_view(simple_projection(shift_m=(0.01, -0.02, 0.03)))
-    np.testing.assert_allclose(at.position_m, [0.01, 0.02, -0.03])
 
 
 @given(st.sampled_from(EYES), SHIFTS)
@@ -210,8 +177,3 @@ def test_openxr_refuses_skew_and_rotation(row: int, column: int) -> None:
     P[row, column] += 0.01
     with pytest.raises(ValueError, match="skew or rotation"):
         openxr_view(Projection("left", P, WIDTH_PX, HEIGHT_PX))
-
-
-def test_a_pose_is_read_only() -> None:
-    with pytest.raises(ValueError, match="read-only"):
-        Pose(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])).position_m[0] = 1.0

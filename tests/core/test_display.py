@@ -12,7 +12,6 @@ from handcal.core.display import (
     eye_projection,
     projection_matrix,
     reprojection_error_px,
-    target_corners_m,
     update_matrix,
     view_of_eye,
 )
@@ -77,12 +76,6 @@ def test_projection_matrix_is_the_product_of_the_paper(shift: tuple[float, ...])
     np.testing.assert_allclose(projection_matrix(DISPLAY, shift), P1, atol=1e-12)
 
 
-def test_no_shift_is_the_offline_calibration() -> None:
-    offline = DISPLAY.K @ DISPLAY.H0 @ np.column_stack([np.eye(3), DISPLAY.t_C0_V_m])
-    np.testing.assert_allclose(projection_matrix(DISPLAY), offline, atol=1e-12)
-    np.testing.assert_array_equal(projection_matrix(DISPLAY, (0, 0, 0)), projection_matrix(DISPLAY))
-
-
 @given(SHIFTS, POINTS)
 def test_rendering_from_v_and_seeing_from_e_agree(
     shift: tuple[float, ...], point: tuple[float, ...]
@@ -97,13 +90,6 @@ def test_rendering_from_v_and_seeing_from_e_agree(
 def test_arcminutes_of_the_paper() -> None:
     assert float(arcmin_from_px(_on_axis(), 7.71)) == pytest.approx(10.79, abs=0.005)
     np.testing.assert_allclose(arcmin_from_px(_on_axis(100.0), [0.0, 100.0]), [0.0, 45 * 60])
-
-
-def test_the_target_is_a_square_straight_ahead_clockwise_as_seen() -> None:
-    np.testing.assert_allclose(
-        target_corners_m(0.5),
-        [[-0.04, -0.04, 0.5], [0.04, -0.04, 0.5], [0.04, 0.04, 0.5], [-0.04, 0.04, 0.5]],
-    )
 
 
 def test_reprojection_error_by_hand() -> None:

@@ -32,10 +32,6 @@ def test_a_cancelled_task_ends_before_it_reports() -> None:
     assert shown == []
 
 
-def test_progress_is_silent_by_default() -> None:
-    Progress().at(1.0, "done")
-
-
 def test_a_part_names_the_activity_unless_another_is_given() -> None:
     shown: list[tuple[str, float]] = []
     progress = Progress(lambda what, share: shown.append((what, share)))

@@ -6,7 +6,7 @@ import pytest
 
 from handcal.core.frozen import readonly
 from handcal.core.geometry import rigid
-from handcal.core.types import Alignment, Eye, Frame, Intrinsics, Projection, Rig, Verification
+from handcal.core.types import Alignment, Eye, Frame, Intrinsics, Rig, Verification
 from handcal.rig.example import example_rig
 
 INTRINSICS = Intrinsics(4, 3, 5.0, 5.0, 1.5, 1.0)
@@ -33,10 +33,6 @@ def test_readonly_keeps_the_memory_of_a_fitting_array_and_leaves_the_original_wr
         frozen[0, 0] = 1.0
 
 
-def test_readonly_puts_arrays_in_c_order() -> None:
-    assert readonly(np.zeros((3, 2)).T, np.float64, (2, 3)).flags.c_contiguous
-
-
 @pytest.mark.parametrize("shape", [(3,), (2, 2), (1, 2, 3)])
 def test_readonly_refuses_a_wrong_shape(shape: tuple[int, ...]) -> None:
     with pytest.raises(ValueError, match="expected an array of shape N×3, got"):
@@ -57,11 +53,6 @@ def test_values_are_frozen_and_their_arrays_read_only(alignment: Alignment) -> N
 def test_an_alignment_is_of_one_eye_or_of_both(alignment: Alignment, eyes: tuple[Eye, ...]) -> None:
     with pytest.raises(ValueError, match=r"Alignment\.eyes: one eye, or each of both once"):
         replace(alignment, eyes=eyes)
-
-
-def test_a_wrong_shape_names_the_field() -> None:
-    with pytest.raises(ValueError, match=r"Projection\.P: expected an array of shape 3×4"):
-        Projection("left", np.eye(4), 10, 10)
 
 
 def test_a_frame_must_fit_its_intrinsics() -> None:

@@ -4,7 +4,6 @@ import sys
 import tracemalloc
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 
@@ -112,13 +111,6 @@ def test_a_pipe_is_neither_waited_for_nor_replaced(tmp_path: Path) -> None:
     assert Path("/dev/null").is_char_device()
 
 
-def test_writing_into_a_missing_folder_says_so(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match=r"cannot write .*: No such file"):
-        write_atomic(tmp_path / "gone" / "a.bin", b"")
-    with pytest.raises(FileError, match="cannot write"):
-        write_atomic(Path("/"), b"")
-
-
 def test_reading_is_limited(tmp_path: Path) -> None:
     path = tmp_path / "a.bin"
     path.write_bytes(b"12345")
@@ -143,7 +135,7 @@ def test_make_folder_makes_parents_and_takes_an_existing_one(tmp_path: Path) -> 
 @pytest.mark.skipif(not Path("/proc").exists(), reason="Linux has it")
 def test_a_folder_that_stores_nothing_is_refused(tmp_path: Path) -> None:
     require_writable(tmp_path / "new" / "folder")
-    with pytest.raises(FileError, match=r"(stored in|cannot write to) /proc: choose"):
+    with pytest.raises(FileError, match=r"(stored in|cannot write to) /proc; choose"):
         require_writable(Path("/proc/a/b"))
 
 
@@ -177,19 +169,6 @@ def test_bad_json_is_a_file_error(tmp_path: Path, content: bytes, problem: str) 
         read_json(path)
 
 
-@pytest.mark.parametrize("colored", [False, True])
-def test_opencv_reads_our_ply(tmp_path: Path, colored: bool) -> None:
-    rng = np.random.default_rng(0)
-    points_m = rng.normal(size=(9, 3)).astype(np.float32)
-    colors = rng.integers(0, 256, (9, 3), dtype=np.uint8) if colored else None
-    path = tmp_path / "a.ply"
-    write_ply(path, points_m, colors)
-    read_points, _, read_colors = cv2.loadPointCloud(str(path))
-    assert np.array_equal(read_points.reshape(-1, 3), points_m)
-    if colors is not None:
-        assert np.array_equal(np.rint(read_colors.reshape(-1, 3) * 255), colors)
-
-
 def test_ply_keeps_doubles_and_further_properties_to_the_last_bit(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     points_m, residual_m = rng.normal(size=(9, 3)), rng.normal(size=9)
@@ -220,17 +199,6 @@ def test_reading_allocates_the_files_size_not_the_limit(tmp_path: Path) -> None:
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert most < 2**20
-
-
-@pytest.mark.parametrize("size", [0, 1, 7, 8, 9])
-def test_no_more_than_the_limit_is_read(tmp_path: Path, size: int) -> None:
-    path = tmp_path / "a.bin"
-    path.write_bytes(bytes(size))
-    if size <= 8:
-        assert read_limited(path, 8) == bytes(size)
-    else:
-        with pytest.raises(FileError, match="larger than the 8 bytes"):
-            read_limited(path, 8)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="there is no /proc")

@@ -45,6 +45,13 @@ def test_a_killed_holder_leaves_it_free(tmp_path: Path) -> None:
         FileLock(path).release()
 
 
+def test_a_file_that_is_no_lock_is_refused_and_kept(tmp_path: Path) -> None:
+    (tmp_path / "lock").write_text("somebody's notes")
+    with pytest.raises(FileError, match="is no lock of handcal"):
+        FileLock(tmp_path / "lock")
+    assert (tmp_path / "lock").read_text() == "somebody's notes"
+
+
 def test_a_missing_folder_says_so(tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"cannot lock .*: No such file"):
         FileLock(tmp_path / "gone" / "lock")

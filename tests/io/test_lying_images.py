@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import time
 import zlib
 from pathlib import Path
 
@@ -86,3 +87,16 @@ def test_a_jpeg_of_endless_scans_is_refused() -> None:
     last = SCANS[SCANS.rindex(b"\xff\xda") : -2]
     with pytest.raises(FileError, match="more than 100 scans"):
         decode_image(SCANS[:-2] + 200 * last + SCANS[-2:], "x", cv2.IMREAD_UNCHANGED)
+
+
+def test_a_png_that_unpacks_to_gigabytes_is_refused_at_once() -> None:
+    packer = zlib.compressobj(9)
+    first, again = (
+        packer.compress(bytes(2**24)) + packer.flush(zlib.Z_FULL_FLUSH) for _ in range(2)
+    )
+    header = chunk(b"IHDR", struct.pack(">IIB", 640, 480, 16) + bytes(4))
+    bomb = PNG[:8] + header + chunk(b"IDAT", first + 79 * again + packer.flush()) + REST[-12:]
+    start_s = time.process_time()
+    with pytest.raises(FileError, match="unpacks to more than its 640x480 pixels"):
+        decode_image(bomb, "x", cv2.IMREAD_UNCHANGED)
+    assert time.process_time() - start_s < 1.0

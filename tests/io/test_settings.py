@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass, field, fields, is_dataclass
-from types import UnionType
-from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+from dataclasses import dataclass, field
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 import pytest
@@ -19,11 +18,8 @@ from handcal.core.errors import FileError
 from handcal.core.types import Float64
 from handcal.io.settings import read_settings, settings_json
 from handcal.lab.demo import DemoSettings
-from handcal.register.fuse import FuseSettings
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
-PLAUSIBLE = st.floats(1e-3, 1e3)  # what no stage refuses
-SCALES = len(FuseSettings().wearer_scales)
 
 
 @dataclass(frozen=True)
@@ -63,48 +59,6 @@ class Aliased:
     words: _Words = ()
 
 
-def any_settings(kind: type) -> st.SearchStrategy[Any]:
-    """Return any JSON-able values of the fields of a settings class, as that class reads them."""
-    return st.fixed_dictionaries(
-        {}, optional={f.name: any_value(get_type_hints(kind)[f.name]) for f in fields(kind)}
-    )
-
-
-def any_value(kind: Any) -> st.SearchStrategy[Any]:
-    if is_dataclass(kind) and isinstance(kind, type):
-        return any_settings(kind)
-    if get_origin(kind) is Literal:
-        return st.sampled_from(get_args(kind))
-    if get_origin(kind) is UnionType:
-        return st.none()
-    known: dict[Any, st.SearchStrategy[Any]] = {
-        float: PLAUSIBLE,
-        int: st.integers(200, 40_000),
-        bool: st.booleans(),
-        str: st.text(),
-        tuple[float, float, float]: st.lists(PLAUSIBLE, min_size=3, max_size=3),
-        # As long as the wearers' default scales and weights, which belong together.
-        tuple[float, ...]: st.lists(PLAUSIBLE, min_size=SCALES, max_size=SCALES),
-    }
-    return known[kind]
-
-
-def holds(stored: Any, given: Any) -> bool:
-    """Return whether all given values are stored."""
-    if isinstance(given, dict):
-        return all(holds(stored[name], value) for name, value in given.items())
-    return bool(stored == given)
-
-
-@given(any_settings(CalibrationSettings))
-def test_calibration_settings_come_back(data: dict[str, Any]) -> None:
-    data.get("segment", {}).update(depth_min_m=0.2, depth_max_m=0.9)  # an order it insists on
-    settings = read_settings(CalibrationSettings, data)
-    stored = json.loads(json.dumps(settings_json(settings), allow_nan=False))
-    assert read_settings(CalibrationSettings, stored) == settings
-    assert holds(stored, data)
-
-
 @given(FINITE, st.lists(FINITE, min_size=3, max_size=3), st.none() | FINITE)
 def test_every_kind_of_value_comes_back(ratio: float, place: list[float], limit: float) -> None:
     data = {
@@ -134,8 +88,8 @@ def test_what_is_absent_takes_its_default_and_a_whole_number_serves_as_any() -> 
     [
         ([], "settings must be an object"),
         (None, "settings must be an object"),
-        ({"speed": 1}, "settings has no speed; it has count, inner, "),
-        ({"inner": {"b": 1, "a": 2}}, "settings.inner has no a, b; it has place_m, ratio"),
+        ({"speed": 1}, "settings has no speed, only count, inner, "),
+        ({"inner": {"b": 1, "a": 2}}, "settings.inner has no a, b, only place_m, ratio"),
         ({"inner": 3}, "settings.inner must be an object"),
         ({"inner": {"ratio": "1"}}, "settings.inner.ratio must be a finite number, not '1'"),
         ({"inner": {"ratio": True}}, "settings.inner.ratio must be a finite number, not 'True'"),
@@ -155,6 +109,7 @@ def test_what_is_absent_takes_its_default_and_a_whole_number_serves_as_any() -> 
         ({"is_on": 1}, "settings.is_on must be true or false, not '1'"),
         ({"kind": "c"}, "settings.kind must be one of a, b"),
         ({"kind": ["a"]}, "settings.kind must be one of a, b"),
+        ({"": 1}, "settings has no field without a name, only count"),
         ({"limit_s": "no"}, "settings.limit_s must be a finite number, not 'no'"),
     ],
 )
@@ -174,11 +129,6 @@ def test_the_stages_own_complaint_carries_its_place() -> None:
 def test_shipped_settings_are_plain_values(settings: Any) -> None:
     stored = json.loads(json.dumps(settings_json(settings)))
     assert read_settings(type(settings), stored) == settings
-
-
-def test_a_field_without_a_name_is_refused() -> None:
-    with pytest.raises(FileError, match="settings has no field without a name; it has count"):
-        read_settings(Outer, {"": 1})
 
 
 def test_what_an_alias_names_is_read_as_that() -> None:

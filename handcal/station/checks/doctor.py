@@ -228,7 +228,7 @@ def _cameras(rig: Path | None) -> list[Finding]:
         advice = "the simulator and recordings work without it"
         if sys.platform == "win32":
             advice += "; a plugged-in camera needs Settings, Privacy, Camera, desktop apps: on"
-        return [Finding("Camera", Health.LIMITED, explain_absence(), advice)]
+        return [Finding("Camera", Health.LIMITED, str(explain_absence()), advice)]
     return [with_rig(examine_camera(device), rig, device.identity) for device in devices]
 
 

@@ -14,10 +14,10 @@ from handcal.camera.recording import check_recording
 from handcal.camera.recordings import RECORDING_SUFFIXES, open_recording
 from handcal.camera.ros import ros_recording
 from handcal.camera.sdk_devices import choose_device, devices_by_child, librealsense
-from handcal.core.errors import HandcalError, LinkError
+from handcal.core.errors import FileError, HandcalError, LinkError
 from handcal.core.progress import Progress
 from handcal.hand.settings import REACH_M
-from handcal.io.files import folder_problem
+from handcal.io.files import require_writable
 from handcal.link.server import LOOPBACK
 from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import Address, UdpTransport, reachable_address
@@ -243,7 +243,9 @@ def _sessions(settings: StationSettings) -> Finding:
         return _broken(f"{settings.sessions_path.parts[0]} is no user's folder", "choose another")
     folder = settings.sessions_path.absolute()
     there = next(path for path in (folder, *folder.parents) if path.exists())
-    if (problem := folder_problem(folder)) is not None:
-        return _broken(*problem)
+    try:
+        require_writable(folder)
+    except FileError as error:
+        return _broken(error.what, error.advice)
     disk = examine_disk(there)
     return disk if there == folder else replace(disk, found=f"{disk.found}; will be created")

@@ -183,7 +183,7 @@ def test_a_folder_that_cannot_be_created_is_refused_beside_it(
     field, file = child(dialog, PathField), tmp_path / "file"
     file.touch()
     field.set_path(str(file / "folder"))
-    refused = f"{file} is a file: choose a folder."
+    refused = f"{file} is a file; choose a folder."
     qtbot.waitUntil(lambda: text(dialog, "folderFound") == refused)
     assert text(dialog, "exportTask") == "Choose another folder to export to."
     assert not press(dialog, "export").isEnabled()

@@ -30,7 +30,7 @@ def test_the_dialog_writes_a_bundle(
     assert text(dialog, "supportFound") == "Choose the folder to write to."
     (tmp_path / "file").touch()
     folder.set_path(str(tmp_path / "file"))
-    qtbot.waitUntil(lambda: "is a file: choose a folder" in text(dialog, "supportFound"))
+    qtbot.waitUntil(lambda: "is a file; choose a folder" in text(dialog, "supportFound"))
     assert not write.isEnabled()
     folder.set_path(str(tmp_path))
     qtbot.waitUntil(lambda: not child(dialog, QLabel, "supportFound").isVisible())

@@ -76,7 +76,7 @@ def test_nothing_is_ready_whose_results_cannot_be_written(
     data = FileEvaluation(lambda _: "", lambda *_: UserTestRun(None, None, ()))  # type: ignore[arg-type]
     (tmp_path / "file").touch()
     for work, given in ((numbers.work, entries), (data, UserEntries())):
-        with pytest.raises(FileError, match="is a file: choose a folder"):
+        with pytest.raises(FileError, match="is a file; choose a folder"):
             work.readiness(replace(given, output=str(tmp_path / "file" / "results")))
     replaced, out_of_reach = tmp_path / "replaced", tmp_path / "another user" / "new"
     replaced.mkdir()
