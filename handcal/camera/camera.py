@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from types import TracebackType
-from typing import Protocol, Self, runtime_checkable
+from contextlib import AbstractContextManager
+from typing import Protocol, runtime_checkable
 
 from handcal.core.types import CameraIdentity, Float32, Frame, Intrinsics
 
 
-class Camera(Protocol):
+class Camera(AbstractContextManager["Camera"], Protocol):
     """A source of frames. Opened by its constructor, closed by `close` or by leaving ``with``.
 
     Only one thread may use a camera at a time.
@@ -36,15 +36,6 @@ class Camera(Protocol):
     def close(self) -> None:
         """Release the device; safe to call twice."""
         ...
-
-    def __enter__(self) -> Self: ...
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None: ...
 
 
 @runtime_checkable

@@ -14,6 +14,12 @@ from handcal.core.types import CameraIdentity, Float32, Frame
 from handcal.io.closable import Closable
 
 _RATE_WINDOW_S = 1.0
+_READ_S = 0.2
+"""Longest duration of `CameraFeed.read`."""
+_SILENT_S = 1.0
+"""Time without a frame after which a problem is reported."""
+_REOPEN_S = 1.0
+"""Time between attempts to open a camera that failed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,18 +37,6 @@ class CameraStatus:
     """The camera opened last; empty before, and if it is not known."""
 
 
-@dataclass(frozen=True, slots=True)
-class FeedSettings:
-    """Timeouts and retry intervals of a camera feed."""
-
-    read_s: float = 0.2
-    """Longest duration of `CameraFeed.read`."""
-    silent_s: float = 1.0
-    """Time without a frame after which a problem is reported."""
-    reopen_s: float = 1.0
-    """Time between attempts to open a camera that failed."""
-
-
 class CameraFeed(Closable):
     """Reads a camera and reopens it when it fails, until a recording ends.
 
@@ -50,18 +44,14 @@ class CameraFeed(Closable):
     ----------
     open_camera : callable
         Returns an open camera; raises CameraError if there is none.
-    settings : FeedSettings
     """
 
-    def __init__(
-        self, open_camera: Callable[[], Camera], settings: FeedSettings | None = None
-    ) -> None:
+    def __init__(self, open_camera: Callable[[], Camera]) -> None:
         self._open_camera = open_camera
-        self._settings = settings or FeedSettings()
         self._camera: Camera | None = None
         self._name = "Camera"
         self._identity = CameraIdentity()
-        self._problem = ""
+        self._error: CameraError | None = None
         self._dropped = 0
         self._last_index: int | None = None
         self._arrived_s: deque[float] = deque()
@@ -75,7 +65,8 @@ class CameraFeed(Closable):
         while self._arrived_s and self._arrived_s[0] < oldest_s:
             self._arrived_s.popleft()
         rate_hz = len(self._arrived_s) / _RATE_WINDOW_S
-        return CameraStatus(self._name, self._problem, rate_hz, self._dropped, self._identity)
+        problem = str(self._error or "")
+        return CameraStatus(self._name, problem, rate_hz, self._dropped, self._identity)
 
     def read(self) -> Frame | None:
         """Return the next frame, or None if none arrives in time; `status` says why."""
@@ -83,19 +74,20 @@ class CameraFeed(Closable):
             if self._camera is None:
                 self._open()
             assert self._camera is not None
-            frame = self._camera.read(self._settings.read_s)
+            frame = self._camera.read(_READ_S)
         except CameraTimeoutError as error:
-            if time.monotonic() - self._heard_s > self._settings.silent_s:
-                self._problem = str(error)
+            if time.monotonic() - self._heard_s > _SILENT_S:
+                self._error = error
             return None
         except CameraEndError as error:
-            self._problem = f"{error} without a frame" if self._last_index is None else str(error)
+            is_empty = self._last_index is None
+            self._error = CameraEndError(f"{error.what} without a frame") if is_empty else error
             self._next_open_s = math.inf
             self.close()
             return None
         except CameraError as error:
             self.close()
-            self._problem = str(error)
+            self._error = error
             return None
         self._note(frame)
         return frame
@@ -115,15 +107,17 @@ class CameraFeed(Closable):
     def _open(self) -> None:
         now_s = time.monotonic()
         if now_s < self._next_open_s:
-            time.sleep(min(self._settings.read_s, self._next_open_s - now_s))
-            raise CameraError(self._problem)
-        self._next_open_s = now_s + self._settings.reopen_s
+            time.sleep(min(_READ_S, self._next_open_s - now_s))
+            # Nothing was tried, so the reason is that of the last attempt.
+            assert self._error is not None
+            raise CameraError(*self._error.args)
+        self._next_open_s = now_s + _REOPEN_S
         self._camera = self._open_camera()
         self._name, self._identity = self._camera.name, self._camera.identity
         self._heard_s = time.monotonic()
 
     def _note(self, frame: Frame) -> None:
-        self._problem = ""
+        self._error = None
         self._heard_s = time.monotonic()
         self._arrived_s.append(self._heard_s)
         if self._last_index is not None:

@@ -11,6 +11,7 @@ Depth is aligned to colour in the other two. Open3D: ``camera_intrinsic.json`` o
 from __future__ import annotations
 
 import os
+from abc import abstractmethod
 from collections import deque
 from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -54,15 +55,70 @@ _MOST_WAITING = 8
 _PNG = (cv2.IMWRITE_PNG_COMPRESSION, 1)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class _Listed:
+    """One frame of a folder, its images not yet read."""
+
     index: int
     t_camera_ns: int
-    has_color: bool
-    T_W_D: Float64 | None
+    depth: Path
+    color: Path | None
+    T_W_D: Float64 | None = None
 
 
-class FolderCamera(PlayedCamera):
+class _ListedCamera(PlayedCamera):
+    """Plays the frames of a list; a subclass makes the list and describes the camera."""
+
+    _frames: list[_Listed]
+    _depth_scale_m: float
+    _color_intrinsics: Intrinsics | None = None
+    _T_C_D: Float64 = np.eye(4)
+
+    def __init__(self, folder: Path, settings: PlaybackSettings | None = None) -> None:
+        super().__init__(settings)
+        self.name = f"Recording {folder.name}"
+        self.identity = CameraIdentity()
+        self._place = 0
+        try:
+            self._open(folder)
+        except FileError as error:
+            raise CameraError(*error.args) from error
+
+    @abstractmethod
+    def _open(self, folder: Path) -> None:
+        """Describe the camera and list the frames; raises FileError or CameraError."""
+
+    def _next(self, timeout_s: float) -> Frame:  # noqa: ARG002 (files do not keep one waiting)
+        if self._place == len(self._frames):
+            raise CameraEndError(f"{self.name} has ended")
+        listed = self._frames[self._place]
+        self._place += 1
+        color, camera = None, None
+        try:
+            if listed.color is not None and self._color_intrinsics is not None:
+                camera = self._color_intrinsics
+                color = read_color(listed.color, camera)
+            return Frame(
+                index=listed.index,
+                t_camera_ns=listed.t_camera_ns,
+                t_host_ns=0,
+                depth=read_depth(listed.depth, self.depth_intrinsics),
+                depth_scale_m=self._depth_scale_m,
+                depth_intrinsics=self.depth_intrinsics,
+                color=color,
+                color_intrinsics=camera,
+                T_C_D=np.eye(4) if camera is None else self._T_C_D,
+                T_W_D=listed.T_W_D,
+            )
+        except FileError as error:
+            raise CameraError(*error.args) from error
+
+    def _go_to(self, t_camera_ns: int) -> None:
+        later = (i for i, frame in enumerate(self._frames) if frame.t_camera_ns >= t_camera_ns)
+        self._place = next(later, len(self._frames))
+
+
+class FolderCamera(_ListedCamera):
     """Plays a folder of frames back; implements `Camera`.
 
     Parameters
@@ -77,24 +133,15 @@ class FolderCamera(PlayedCamera):
         If it is not such a folder, or its version is unknown.
     """
 
-    def __init__(self, folder: Path, settings: PlaybackSettings | None = None) -> None:
-        super().__init__(settings)
-        self.name = f"Recording {folder.name}"
-        self._folder = folder
-        self._place = 0
-        if not (folder / DESCRIPTION).is_file():
+    def _open(self, folder: Path) -> None:
+        path = folder / DESCRIPTION
+        if not path.is_file():
             raise CameraError(
                 f"{folder} is not a recording: it has no {DESCRIPTION} (handcal), no "
                 "camera_intrinsic.json beside color and depth (Open3D), no depth.txt (TUM RGB-D) "
                 "and no metadata.yaml (ROS 2)"
             )
-        try:
-            self._describe(read_json(folder / DESCRIPTION), folder / DESCRIPTION)
-            self._frames = _read_list(folder / LIST)
-        except FileError as error:
-            raise CameraError(str(error)) from error
-
-    def _describe(self, values: dict[str, Any], path: Path) -> None:
+        values = read_json(path)
         if values.get("handcal_recording") != _VERSION:
             raise FileError(f"{path} is not a handcal recording of version {_VERSION}")
         depth, color = values.get("depth"), values.get("color")
@@ -113,33 +160,7 @@ class FolderCamera(PlayedCamera):
             self.identity = identity_from_json(values.get("device"), "device")
         except ValueError as error:
             raise FileError(f"{path}: {error}") from error
-
-    def _next(self, timeout_s: float) -> Frame:  # noqa: ARG002 (files do not keep one waiting)
-        if self._place == len(self._frames):
-            raise CameraEndError(f"{self.name} has ended")
-        listed = self._frames[self._place]
-        self._place += 1
-        depth_path, color_path = _image_paths(self._folder, self._place)
-        color_camera = self._color_intrinsics if listed.has_color else None
-        try:
-            return Frame(
-                index=listed.index,
-                t_camera_ns=listed.t_camera_ns,
-                t_host_ns=0,
-                depth=read_depth(depth_path, self.depth_intrinsics),
-                depth_scale_m=self._depth_scale_m,
-                depth_intrinsics=self.depth_intrinsics,
-                color=None if color_camera is None else read_color(color_path, color_camera),
-                color_intrinsics=color_camera,
-                T_C_D=np.eye(4) if color_camera is None else self._T_C_D,
-                T_W_D=listed.T_W_D,
-            )
-        except FileError as error:
-            raise CameraError(str(error)) from error
-
-    def _go_to(self, t_camera_ns: int) -> None:
-        later = (i for i, frame in enumerate(self._frames) if frame.t_camera_ns >= t_camera_ns)
-        self._place = next(later, len(self._frames))
+        self._frames = _read_list(folder)
 
 
 def record_folder(
@@ -240,8 +261,9 @@ def _image_paths(folder: Path, number: int) -> tuple[Path, Path]:
     return folder / f"depth-{number:06}.png", folder / f"color-{number:06}.png"
 
 
-def _read_list(path: Path) -> list[_Listed]:
+def _read_list(folder: Path) -> list[_Listed]:
     """Read the list of frames; an incomplete last line, as after a crash, is ignored."""
+    path = folder / LIST
     text = read_limited(path, _MAX_LIST_BYTES).decode("ascii", errors="replace")
     # An editor on Windows ends lines with two characters.
     columns, *lines = text.replace("\r\n", "\n").split("\n")[:-1] or [""]
@@ -250,24 +272,26 @@ def _read_list(path: Path) -> list[_Listed]:
     if len(lines) > _MOST_FRAMES:
         raise FileError(f"{path} lists more than {_MOST_FRAMES:,} frames")
     is_posed = columns == _POSED_COLUMNS
-    what = "three 64-bit whole numbers" + ", and 12 numbers of a rigid transform" * is_posed
+    wanted = "three 64-bit whole numbers" + ", and 12 numbers of a rigid transform" * is_posed
     frames = []
     for number, line in enumerate(lines, start=2):
         fields = line.split(",")
         try:
             if len(fields) != 3 + is_posed:
                 raise ValueError("another number of fields")
-            frames.append(_listed(*fields))
+            frames.append(_listed(*_image_paths(folder, number - 1), *fields))
         except ValueError as error:
             raise FileError(
-                f"{path} must hold {what} on each line",
-                f"line {number} does not",
+                f"{path} must hold {wanted} on each line, but line {number} does not"
             ) from error
     return frames
 
 
-def _listed(index: str, t_camera_ns: str, has_color: str, pose: str = "") -> _Listed:
-    listed = _Listed(int(index), int(t_camera_ns), bool(int(has_color)), _pose_from(pose))
+def _listed(
+    depth: Path, color: Path, index: str, t_camera_ns: str, has_color: str, pose: str = ""
+) -> _Listed:
+    images = depth, color if int(has_color) else None
+    listed = _Listed(int(index), int(t_camera_ns), *images, _pose_from(pose))
     if max(abs(listed.index), abs(listed.t_camera_ns)) >= 2**63:
         raise ValueError("more than 64 bits")
     return listed
@@ -304,7 +328,7 @@ _TUM_CAMERA = Intrinsics(640, 480, 525.0, 525.0, 319.5, 239.5)
 """As TUM's own tools assume (their page on file formats)."""
 _TUM_PER_M, _PER_M, _FPS = 5000.0, 1000.0, 30.0
 _APART_NS = 20_000_000  # as TUM's associate.py
-_MAX_TUM_BYTES, _MOST_FRAMES = 16 * 2**20, 1_000_000
+_MAX_TUM_BYTES = 16 * 2**20
 
 
 def is_image_folder(folder: Path) -> bool:
@@ -314,7 +338,7 @@ def is_image_folder(folder: Path) -> bool:
     )
 
 
-class ImageFolderCamera(PlayedCamera):
+class ImageFolderCamera(_ListedCamera):
     """Plays a folder of Open3D or TUM; implements `Camera`.
 
     Parameters
@@ -328,56 +352,24 @@ class ImageFolderCamera(PlayedCamera):
         If its files are missing or malformed.
     """
 
-    def __init__(self, folder: Path, settings: PlaybackSettings | None = None) -> None:
-        super().__init__(settings)
-        self.name = f"Recording {folder.name}"
-        self.identity = CameraIdentity()
-        self._place = 0
+    def _open(self, folder: Path) -> None:
         is_tum = (folder / _TUM_DEPTH).is_file()
-        try:
-            path = next((folder / one for one in _INTRINSICS if (folder / one).is_file()), None)
-            values = {} if path is None else read_json(path)
-            if path is None:
-                self.depth_intrinsics = _TUM_CAMERA
-                self.notes = (f"no {_INTRINSICS[0]}: TUM's usual intrinsics, 525 px, are taken",)
-            else:
-                self.depth_intrinsics = _intrinsics(values, path)
-            values = {"depth_scale": _TUM_PER_M if is_tum else _PER_M, "fps": _FPS} | values
-            path = path or folder
-            self._depth_scale_m = 1.0 / number_from(values, path, "depth_scale", 10.0, 1e6)
-            self._frames = (
-                _tum_frames(folder)
-                if is_tum
-                else _open3d_frames(folder, number_from(values, path, "fps", 0.1, 1000.0))
-            )
-        except FileError as error:
-            raise CameraError(str(error)) from error
+        path = next((folder / name for name in _INTRINSICS if (folder / name).is_file()), None)
+        values = {"depth_scale": _TUM_PER_M if is_tum else _PER_M, "fps": _FPS}
+        if path is None:
+            path, camera = folder, _TUM_CAMERA
+            self.notes = (f"no {_INTRINSICS[0]}: TUM's usual intrinsics, 525 px, are taken",)
+        else:
+            values |= read_json(path)
+            camera = _intrinsics(values, path)
+        self.depth_intrinsics = self._color_intrinsics = camera
+        self._depth_scale_m = 1.0 / number_from(values, path, "depth_scale", 10.0, 1e6)
+        if is_tum:
+            self._frames = _tum_frames(folder)
+        else:
+            self._frames = _open3d_frames(folder, number_from(values, path, "fps", 0.1, 1000.0))
         if not 0 < len(self._frames) <= _MOST_FRAMES:
             raise CameraError(f"{folder} has {len(self._frames)} depth images")
-
-    def _next(self, timeout_s: float) -> Frame:  # noqa: ARG002 (files do not keep one waiting)
-        if self._place == len(self._frames):
-            raise CameraEndError(f"{self.name} has ended")
-        t_ns, depth, color = self._frames[self._place]
-        self._place += 1
-        camera = self.depth_intrinsics
-        try:
-            return Frame(
-                index=self._place,
-                t_camera_ns=t_ns,
-                t_host_ns=0,
-                depth=read_depth(depth, camera),
-                depth_scale_m=self._depth_scale_m,
-                depth_intrinsics=camera,
-                color=None if color is None else read_color(color, camera),
-                color_intrinsics=None if color is None else camera,
-            )
-        except FileError as error:
-            raise CameraError(str(error)) from error
-
-    def _go_to(self, t_camera_ns: int) -> None:
-        later = (place for place, one in enumerate(self._frames) if one[0] >= t_camera_ns)
-        self._place = next(later, len(self._frames))
 
 
 def _intrinsics(values: dict[str, Any], path: Path) -> Intrinsics:
@@ -392,8 +384,8 @@ def _intrinsics(values: dict[str, Any], path: Path) -> Intrinsics:
     return intrinsics_from(size | {"fx": fx, "fy": fy, "cx": cx, "cy": cy}, path)
 
 
-def _open3d_frames(folder: Path, fps: float) -> list[tuple[int, Path, Path | None]]:
-    """Return time, depth and colour of each frame; the images are numbered, not timed."""
+def _open3d_frames(folder: Path, fps: float) -> list[_Listed]:
+    """Return the frames of images that are numbered, not timed."""
     depths, colors = (
         {
             path.stem: path
@@ -403,22 +395,22 @@ def _open3d_frames(folder: Path, fps: float) -> list[tuple[int, Path, Path | Non
         for name in ("depth", "color")
     )
     return [
-        (round(number * 1e9 / fps), path, colors.get(stem))
+        _Listed(number + 1, round(number * 1e9 / fps), path, colors.get(stem))
         for number, (stem, path) in enumerate(depths.items())
     ]
 
 
-def _tum_frames(folder: Path) -> list[tuple[int, Path, Path | None]]:
-    """Return time, depth and colour of each frame: the colour nearest in time."""
+def _tum_frames(folder: Path) -> list[_Listed]:
+    """Return the frames, each with the colour nearest in time."""
     colors = _tum_list(folder / _TUM_COLOR) if (folder / _TUM_COLOR).is_file() else []
     times_ns = np.array([t_ns for t_ns, _ in colors], np.int64)
-    frames: list[tuple[int, Path, Path | None]] = []
-    for t_ns, depth in _tum_list(folder / _TUM_DEPTH):
+    frames = []
+    for number, (t_ns, depth) in enumerate(_tum_list(folder / _TUM_DEPTH), start=1):
         after = int(np.searchsorted(times_ns, t_ns))
-        near = colors[max(0, after - 1) : after + 1]
-        nearest = min(near, key=lambda one: abs(one[0] - t_ns), default=None)
-        is_near = nearest is not None and abs(nearest[0] - t_ns) <= _APART_NS
-        frames.append((t_ns, depth, nearest[1] if nearest is not None and is_near else None))
+        around = colors[max(0, after - 1) : after + 1]
+        near = [(color_ns, path) for color_ns, path in around if abs(color_ns - t_ns) <= _APART_NS]
+        _, color = min(near, key=lambda image: abs(image[0] - t_ns), default=(t_ns, None))
+        frames.append(_Listed(number, t_ns, depth, color))
     return frames
 
 

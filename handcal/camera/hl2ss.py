@@ -215,8 +215,7 @@ class Hl2ssConnection(Closable):
                 raise CameraError(f"the connection to hl2ss at {self._where} broke") from error
             if not arrived:
                 raise CameraError(
-                    f"hl2ss at {self._where} ended the stream",
-                    "one program at a time can read it",
+                    f"hl2ss at {self._where} ended the stream: one program at a time can read it"
                 )
             self._data += arrived
 

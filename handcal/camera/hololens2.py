@@ -255,7 +255,7 @@ class HoloLens2RealSense(Closable):
         try:
             self.depth_intrinsics = read_rig(settings.realsense_rig).depth_intrinsics
         except FileError as error:
-            raise CameraError(str(error)) from error
+            raise CameraError(*error.args) from error
         host, port = settings.host, settings.port or _DEPTH_PORT
         with Hl2ssConnection(host, settings.color_port or _VIDEO_PORT, _LIST_REQUEST) as connection:
             (size,) = struct.unpack("<I", connection.receive(4, _LIST_S))
@@ -302,7 +302,7 @@ def find_depth(listed: bytes, lens: Intrinsics) -> DepthFormat:
             (_name(group["DisplayName"]), _number(key), group["SourceInfos"]["0"])
             for key, group in groups.items()
         ]
-        depth = [one for one in cameras if "RealSense" in one[0] and one[0].endswith("Depth")]
+        depth = [camera for camera in cameras if re.search("RealSense.*Depth$", camera[0])]
         formats = [
             (rate_hz, DepthFormat(name, group, media, round(rate_hz / _RATE_HZ)))
             for name, group, source in depth

@@ -77,7 +77,7 @@ def read_frame(
     if "depth_scale" not in values:
         raise FileError(
             f"{intrinsics} must give depth_scale, in metres per unit of depth",
-            "or use --depth-scale: 0.001 for millimetres",
+            "add it, or use --depth-scale: 0.001 for millimetres",
         )
     depth_scale_m = depth_scale_from(values, intrinsics)
     depth_image = read_depth(depth, camera)

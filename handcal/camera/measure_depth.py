@@ -103,8 +103,8 @@ def run_depth_check(
     if edges is None:
         why_no_edges = f"{len(borders_px)} views are too few: {MIN_BORDER_VIEWS} are needed"
         if no_border:
-            why, count = no_border.most_common(1)[0]
-            why_no_edges += f"; in {count} others {why}"
+            reason, count = no_border.most_common(1)[0]
+            why_no_edges += f"; in {count} others {reason}"
     try:
         board_shape = FLAT
         if last is not None and len(views) >= MIN_DEPTH_VIEWS:
@@ -113,8 +113,8 @@ def run_depth_check(
     except ViewsError as error:
         if not passed_over:
             raise
-        why, count = passed_over.most_common(1)[0]
-        raise ViewsError(f"{error}", f"{count} frames were not used: {why}") from error
+        reason, count = passed_over.most_common(1)[0]
+        raise ViewsError(f"{error}; {count} frames were not used: {reason}") from error
 
 
 def _seen_in(frame: Frame, board: Board, selector: ViewSelector) -> BoardView:

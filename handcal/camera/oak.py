@@ -48,16 +48,13 @@ class OakCamera(Closable):
         dai = _library()
         self._pipeline: Any = None
         self._device: Any = None
-        found = [
-            one
-            for one in dai.Device.getAllAvailableDevices()
-            if device_id in ("", one.getDeviceId())
-        ]
-        if not found:
+        connected = dai.Device.getAllAvailableDevices()
+        chosen = [info for info in connected if device_id in ("", info.getDeviceId())]
+        if not chosen:
             which = f"OAK-D {device_id} is" if device_id else "OAK-D is"
             raise CameraError(f"no {which} connected", "plug one into a USB 3 port")
         try:
-            self._device = dai.Device(found[0])
+            self._device = dai.Device(chosen[0])
             self.identity = CameraIdentity(
                 self._device.getProductName() or self._device.getDeviceName(),
                 self._device.getDeviceId(),

@@ -11,16 +11,19 @@ from handcal.core.types import Bool, Float32, Intrinsics, UInt16
 DEPTH_SCALE_M = 0.0001
 """Metres per unit of the resampled depth."""
 
+# Plausible focal lengths: wider than a fisheye, or narrower than a telescope, is no depth camera.
 _FOCAL_PX = 50.0, 2000.0
-_STRIDE = 8
-_STEPS = 40
-_DAMPING = 0.6  # of Newton's steps; at the sides, a lens's focal length is half of the middle's
-_SAME_RAY = 1e-3
+_BESIDE_PX = 8  # the focal length is measured over so many pixels, for the rounding of the rays
+# A missed ray times the middle's focal length is Newton's step in the middle. At the sides, where
+# a wide lens has half of that focal length, it is twice too long, so it is damped. Of its error a
+# step leaves 0.4 in the middle and 0.2 at the sides, so these are more than enough.
+_DAMPING, _STEPS = 0.6, 30
+_SAME_RAY = 1e-3  # a quarter of a pixel; what misses it by more lies outside the lens's view
 _LEAST_COVERED = 0.5
-_JUMP_M = 0.02
-_NEAR_M = 0.7
-_SKIN = 0.5
-_BRIGHT_PIXELS = 1000
+_JUMP_M = 0.02  # between two surfaces, as `SegmentSettings.edge_jump_m`
+# Nearest bright surface: a hand in reach, of which at least so many pixels are seen.
+_NEAR_M, _BRIGHT_PIXELS = 0.7, 1000
+_SKIN = 0.5  # share of infrared light that it reflects
 
 
 class PinholeView:
@@ -43,24 +46,20 @@ class PinholeView:
 
     def __init__(self, rays: Float32) -> None:
         height, width = rays.shape[:2]
+        # Large numbers in place of none, which would spread through the interpolation.
         rays = np.nan_to_num(rays, nan=1e6, posinf=1e6, neginf=1e6).clip(-1e6, 1e6)
-        self.intrinsics = _pinhole(rays)
-        camera = self.intrinsics
-        x = ((np.arange(width + _STRIDE) - camera.cx) / camera.fx).astype(np.float32)
-        y = ((np.arange(height + _STRIDE) - camera.cy) / camera.fy).astype(np.float32)
-        coarse = _search(rays, x[::_STRIDE], y[::_STRIDE], camera)
-        stretch = np.float32(1.0 / _STRIDE)
-        column, row = np.meshgrid(np.arange(width), np.arange(height))
-        place = _look(coarse, np.dstack([column, row]).astype(np.float32) * stretch)
-        wanted = np.dstack(np.meshgrid(x[:width], y[:height]))
-        place = _nearer(rays, place, wanted, camera)
+        self.intrinsics = camera = _pinhole(rays)
+        focal_px = np.array([camera.fx, camera.fy], np.float32)
+        last_px = np.array([width - 1, height - 1], np.float32)
+        place = np.dstack(np.meshgrid(np.arange(width), np.arange(height))).astype(np.float32)
+        wanted = (place - np.array([camera.cx, camera.cy], np.float32)) / focal_px
+        for _ in range(_STEPS):
+            missed = wanted - _look(rays, place)
+            place = np.clip(place + np.float32(_DAMPING) * focal_px * missed, 0.0, last_px)
         missed = wanted - _look(rays, place)
         self._is_inside = (np.abs(missed) < _SAME_RAY).all(axis=2)
         if self._is_inside.mean() < _LEAST_COVERED:
-            raise CameraError(
-                "the camera's rays do not fill an image",
-                "its calibration is damaged",
-            )
+            raise CameraError("the camera's rays do not fill an image: its calibration is damaged")
         self._place = place
         self._corner = np.floor(place)
         self._z_per_m = 1.0 / np.sqrt(1.0 + np.square(wanted).sum(axis=2))
@@ -100,38 +99,19 @@ def _look(image: Float32, place: Float32, how: int = cv2.INTER_LINEAR) -> Float3
     return np.asarray(cv2.remap(image, *maps, how, borderMode=cv2.BORDER_REPLICATE), np.float32)
 
 
-def _search(rays: Float32, x: Float32, y: Float32, camera: Intrinsics) -> Float32:
-    """Return the places (h, w, 2), in pixels, at which the rays are those of a grid of x and y."""
-    wanted = np.dstack(np.meshgrid(x, y))
-    place = (wanted * [camera.fx, camera.fy] + [camera.cx, camera.cy]).astype(np.float32)
-    for _ in range(_STEPS):
-        place = _nearer(rays, place, wanted, camera)
-    return place
-
-
-def _nearer(rays: Float32, place: Float32, wanted: Float32, camera: Intrinsics) -> Float32:
-    """Return places (h, w, 2) one step nearer to where the rays are the wanted ones."""
-    step = np.float32(_DAMPING) * np.array([camera.fx, camera.fy], np.float32)
-    limit = np.array([camera.width - 1, camera.height - 1], np.float32)
-    missed = wanted - _look(rays, place)
-    return np.clip(place + step * missed, np.float32(0.0), limit)
-
-
 def _pinhole(rays: Float32) -> Intrinsics:
     """Return the pinhole camera that agrees with the rays around the axis."""
     height, width = rays.shape[:2]
     row, column = np.unravel_index(np.square(rays).sum(axis=2).argmin(), (height, width))
     slopes = np.zeros(2)
-    if 8 <= row < height - 8 and 8 <= column < width - 8:
-        # Over some pixels, for the rounding.
-        slopes[0] = (rays[row, column + 8, 0] - rays[row, column - 8, 0]) / 16.0
-        slopes[1] = (rays[row + 8, column, 1] - rays[row - 8, column, 1]) / 16.0
+    beside = _BESIDE_PX
+    if beside <= row < height - beside and beside <= column < width - beside:
+        right, left = rays[row, column + beside, 0], rays[row, column - beside, 0]
+        below, above = rays[row + beside, column, 1], rays[row - beside, column, 1]
+        slopes = np.array([right - left, below - above]) / (2.0 * beside)
     low, high = _FOCAL_PX
     if not ((slopes > 1.0 / high) & (slopes < 1.0 / low)).all():
-        raise CameraError(
-            "the camera's rays are not those of a lens",
-            "its calibration is damaged",
-        )
+        raise CameraError("the camera's rays are not those of a lens: its calibration is damaged")
     fx, fy = 1.0 / slopes
     x, y = rays[row, column]
     return Intrinsics(

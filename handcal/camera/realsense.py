@@ -147,21 +147,21 @@ def depth_filter(settings: RealSenseSettings) -> Callable[[Any], Any]:
         filters.append(rs.hole_filling_filter())
 
     def apply(depth: Any) -> Any:
-        for one in filters:
-            depth = one.process(depth).as_depth_frame()
+        for step in filters:
+            depth = step.process(depth).as_depth_frame()
         return depth
 
     return apply
 
 
-def _set(sensor: Any, option: Any, value: float, what: str, unit: str = "") -> None:
+def _set(sensor: Any, option: Any, value: float, name: str, unit: str = "") -> None:
     if not sensor.supports(option):
-        raise CameraError(f"this camera has no {what} to set", "leave it as it is")
+        raise CameraError(f"this camera has no {name} to set", "leave it as it is")
     limits = sensor.get_option_range(option)
     if not limits.min <= value <= limits.max:
         raise CameraError(
-            f"{what} ranges from {limits.min:g} to {limits.max:g} {unit}".rstrip()
-            + f", so {value:g} cannot be set"
+            f"{name} cannot be set to {value:g}",
+            f"it ranges from {limits.min:g} to {limits.max:g} {unit}".rstrip(),
         )
     sensor.set_option(option, value)
 
@@ -297,7 +297,7 @@ def _choose_streams(handle: Any, device: Device, wanted: Profile) -> tuple[_Stre
         advice = f"it is on USB {device.usb}: use a USB 3 port and cable"
     raise CameraError(
         f"{device.name} offers no depth with colour of {' or '.join(sizes)} at {_RATE_HZ} Hz",
-        f"{advice}",
+        advice,
     )
 
 

@@ -17,6 +17,11 @@ from handcal.core.types import Frame
 from handcal.io.files import make_folder
 
 _POLL_S = 0.2
+_SILENT_S = 5.0  # a camera that sends no frame for this time has ended
+_FREE_BYTES = 2**30  # disk space to leave free
+_LEAD_FRAMES = 30
+"""Most frames skipped at the beginning, until one has colour: cameras pair their first images
+badly."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,13 +31,6 @@ class RecordSettings:
     duration_s: float = 60.0
     """In camera time; a raw pair of 1280x720 images takes 4.6 MB, 8 GB per minute."""
     frames: int = 100_000
-    silent_s: float = 5.0
-    """A camera that sends no frame for this time has ended."""
-    free_bytes: int = 2**30
-    """Disk space to leave free."""
-    lead_frames: int = 30
-    """Most frames skipped at the beginning, until one has colour: cameras pair their first images
-    badly."""
     gate_m: tuple[float, float] | None = None
     """Depth gate to keep in the recording, for `replay`."""
 
@@ -107,7 +105,7 @@ class _Take:
             try:
                 frame = camera.read(_POLL_S)
             except CameraTimeoutError as error:
-                if time.monotonic() - heard_s > self._settings.silent_s:
+                if time.monotonic() - heard_s > _SILENT_S:
                     self.stop_reason = str(error)
                     return
             except CameraEndError:
@@ -127,7 +125,7 @@ class _Take:
         lead: list[Frame] = []
         for frame in frames:
             lead = [frame] if frame.color is not None else [*lead, frame]
-            if frame.color is not None or len(lead) > self._settings.lead_frames:
+            if frame.color is not None or len(lead) > _LEAD_FRAMES:
                 break
         yield from lead
         yield from frames
@@ -144,7 +142,7 @@ class _Take:
             yield frame
             if share >= 1.0:
                 self.stop_reason = "as long as asked for"
-            elif shutil.disk_usage(self._disk).free < settings.free_bytes:
+            elif shutil.disk_usage(self._disk).free < _FREE_BYTES:
                 self.stop_reason = "the disk is nearly full"
             else:
                 continue

@@ -299,7 +299,7 @@ def _record(path: Path, frames: Iterable[Frame], identity: CameraIdentity) -> in
     rs = librealsense()
     first, frames = of_one_camera(frames)
     if first.T_W_D is not None:
-        raise ValueError("a .db3 file holds no poses; record this camera into a folder")
+        raise ValueError("a .db3 file holds no poses: record this camera into a folder")
     device = rs.software_device()
     for what, text in zip(_IDENTITY, astuple(identity), strict=True):
         if text:

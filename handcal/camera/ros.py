@@ -11,6 +11,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 from contextlib import suppress
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -138,12 +139,12 @@ class RosCamera(PlayedCamera):
 
     def _go_to(self, t_camera_ns: int) -> None:
         self._index = 0
-        self._frames = (one for one in self._play() if one.t_camera_ns >= t_camera_ns)
+        self._frames = (frame for frame in self._play() if frame.t_camera_ns >= t_camera_ns)
 
     def _describe(self) -> None:
         """Find the topics, and read the cameras and the transform between them."""
         firsts = {topic: self._first(topic) for topic in self._topics(_IMAGE, _COMPRESSED)}
-        kinds = {topic: "" if one is None else _kind(one) for topic, one in firsts.items()}
+        kinds = {topic: "" if image is None else _kind(image) for topic, image in firsts.items()}
         depth = [topic for topic, kind in kinds.items() if kind == "depth"]
         color = [topic for topic, kind in kinds.items() if kind == "color"]
         if not depth:
@@ -163,10 +164,10 @@ class RosCamera(PlayedCamera):
         if known:
             self._color_topic = min(known, key=lambda topic: (topic in raw_first, topic))
             self._color_intrinsics = self._intrinsics(self._color_topic)
-            frames: tuple[Any, Any] = firsts[self._color_topic], firsts[self._depth_topic]
-            self._T_C_D = self._transform(*(one.header.frame_id for one in frames))
+            images: tuple[Any, Any] = firsts[self._color_topic], firsts[self._depth_topic]
+            self._T_C_D = self._transform(*(image.header.frame_id for image in images))
         unused = self._ignored(kinds, firsts, self._depth_topic, self._color_topic)
-        self.notes = tuple(f"not played: {one}" for one in unused)
+        self.notes = tuple(f"not played: {topic}" for topic in unused)
 
     def _ignored(
         self, kinds: dict[str, str], firsts: dict[str, Any], *played: str | None
@@ -177,7 +178,7 @@ class RosCamera(PlayedCamera):
             for topic, info in self._reader.topics.items()
             if topic not in (*played, "/tf", "/tf_static") and info.msgtype != _INFO
         ]
-        for topic in sorted(others, key=lambda one: (one not in kinds, one))[:_MOST_IGNORED]:
+        for topic in sorted(others, key=lambda topic: (topic not in kinds, topic))[:_MOST_IGNORED]:
             first = firsts.get(topic)
             if topic not in kinds:
                 kind = self._reader.topics[topic].msgtype
@@ -197,7 +198,7 @@ class RosCamera(PlayedCamera):
         return [topic for topic, info in self._reader.topics.items() if info.msgtype in kinds]
 
     def _messages(self, *topics: str) -> Iterator[tuple[str, Any]]:
-        chosen = [one for one in self._reader.connections if one.topic in topics]
+        chosen = [link for link in self._reader.connections if link.topic in topics]
         # rosbags takes an empty choice for all.
         messages = self._reader.messages(connections=chosen) if chosen else ()
         for connection, _, data in messages:
@@ -220,13 +221,13 @@ class RosCamera(PlayedCamera):
                 "record it as well",
             )
         k, d = (info.k, info.d) if hasattr(info, "k") else (info.K, info.D)  # ROS 1
-        fx, skew, cx, _, fy, cy, *_ = (float(one) for one in k)
+        fx, skew, cx, _, fy, cy, *_ = map(float, k)
         values = np.array([fx, fy, cx, cy, *d])
         if not np.isfinite(values).all() or fx < 1.0 or fy < 1.0 or skew != 0.0:
             raise CameraError(
                 f"{self._folder}: the intrinsics of {topic} are not those of a camera"
             )
-        distortion = tuple(float(one) for one in d) if np.any(d) else ()
+        distortion = tuple(map(float, d)) if np.any(d) else ()
         if info.distortion_model not in _MODELS or len(distortion) not in DISTORTION_COUNTS:
             raise CameraError(
                 f"{self._folder}: lens model {info.distortion_model!r} of {topic} is not known",
@@ -239,10 +240,10 @@ class RosCamera(PlayedCamera):
         near: dict[str, dict[str, Float64]] = {}
         if dst != src:
             messages = (message for _, message in self._messages("/tf_static", "/tf"))
-            stamped = (one for message in messages for one in message.transforms)
-            for one, _ in zip(stamped, range(_MOST_TRANSFORMS), strict=False):
-                parent, child, moved = one.header.frame_id, one.child_frame_id, one.transform
-                turn, place = moved.rotation, moved.translation
+            transforms = chain.from_iterable(message.transforms for message in messages)
+            for stamped in islice(transforms, _MOST_TRANSFORMS):
+                parent, child = stamped.header.frame_id, stamped.child_frame_id
+                turn, place = stamped.transform.rotation, stamped.transform.translation
                 values = [turn.x, turn.y, turn.z, turn.w, place.x, place.y, place.z]
                 if not np.isfinite(values).all() or not np.any(values[:4]):
                     raise CameraError(
@@ -253,24 +254,24 @@ class RosCamera(PlayedCamera):
                 T_parent_child = rigid(Rotation.from_quat(values[:4]).as_matrix(), values[4:])
                 near.setdefault(child, {}).setdefault(parent, T_parent_child)
                 near.setdefault(parent, {}).setdefault(child, invert(T_parent_child))
-        found = {src: np.eye(4)}  # T_frame_src
+        T_frame_src = {src: np.eye(4)}
         reached = [src]
-        for frame in reached:
+        for frame in reached:  # breadth first, along the shortest chain of transforms
             for other, T_other_frame in near.get(frame, {}).items():
-                if other not in found:
-                    found[other] = T_other_frame @ found[frame]
+                if other not in T_frame_src:
+                    T_frame_src[other] = T_other_frame @ T_frame_src[frame]
                     reached.append(other)
-        if dst not in found or not is_rigid(found[dst], _REACH_M):
+        if dst not in T_frame_src or not is_rigid(T_frame_src[dst], _REACH_M):
             raise CameraError(
                 f"{self._folder} has no transform between {src!r} and {dst!r}, the frames of depth "
                 "and colour",
                 "record /tf_static as well",
             )
-        return found[dst]
+        return T_frame_src[dst]
 
     def _play(self) -> Iterator[Frame]:
         """Yield frames, each once the colour after it has arrived."""
-        topics = [one for one in (self._depth_topic, self._color_topic) if one is not None]
+        topics = filter(None, (self._depth_topic, self._color_topic))
         waiting: list[Any] = []
         colors: list[Any] = []
         for topic, message in self._messages(*topics):
@@ -292,7 +293,7 @@ class RosCamera(PlayedCamera):
     def _frame(self, message: Any, colors: list[Any]) -> Frame:
         t_ns = _stamp_ns(message)
         depth, scale_m = _depth(message, self.depth_intrinsics)
-        nearest = min(colors, key=lambda one: abs(_stamp_ns(one) - t_ns), default=None)
+        nearest = min(colors, key=lambda image: abs(_stamp_ns(image) - t_ns), default=None)
         color = None
         if nearest is not None and abs(_stamp_ns(nearest) - t_ns) <= _APART_NS:
             assert self._color_intrinsics is not None

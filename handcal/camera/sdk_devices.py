@@ -25,8 +25,8 @@ _INTEL = "8086"
 _L500 = ("0b0d", "0b3d", "0b64", "0b68")
 
 
-def explain_absence(devices: Path = _LISTED_BY_LINUX) -> str:
-    """Return one line: the reason why librealsense lists no camera, and what to do.
+def explain_absence(devices: Path = _LISTED_BY_LINUX) -> CameraError:
+    """Return the reason why librealsense lists no camera, and what to do.
 
     Only Linux lists USB devices; elsewhere the camera is assumed to be unplugged.
 
@@ -42,16 +42,16 @@ def explain_absence(devices: Path = _LISTED_BY_LINUX) -> str:
         and (_read(device, "idProduct") in _L500 or "realsense" in _read(device, "product").lower())
     ]
     if any(product_id in _L500 for product_id in product_ids):
-        return (
-            "a RealSense L515 is connected, which librealsense supports only up to version 2.54; "
-            "use a camera of the D400 family"
+        return CameraError(
+            "a RealSense L515 is connected, which librealsense supports only up to version 2.54",
+            "use a camera of the D400 family",
         )
     if product_ids:
-        return (
-            "a RealSense camera is connected, but librealsense may not open it; install Intel's "
-            "udev rules (99-realsense-libusb.rules) and plug it in again"
+        return CameraError(
+            "a RealSense camera is connected, but librealsense may not open it",
+            "install Intel's udev rules (99-realsense-libusb.rules) and plug it in again",
         )
-    return "no RealSense camera is connected; plug one into a USB 3 port"
+    return CameraError("no RealSense camera is connected", "plug one into a USB 3 port")
 
 
 def _read(device: Path, attribute: str) -> str:
@@ -158,7 +158,7 @@ def devices_by_child(progress: Progress = Progress()) -> list[Device]:
         If it was cancelled.
     """
     advice = (
-        "unplug the camera and plug it in again; if it still fails, reinstall pyrealsense2 "
+        "unplug the camera and plug it in again, and if it still fails, reinstall pyrealsense2 "
         "(the simulator, recordings and other cameras work without)"
     )
     command = [sys.executable, "-m", "handcal.camera.sdk_devices"]
@@ -182,8 +182,7 @@ def devices_by_child(progress: Progress = Progress()) -> list[Device]:
                     progress.check()
                     if time.monotonic() > end_s:
                         raise CameraError(
-                            f"librealsense lists no devices within {_LONGEST_LISTING_S:g} s: "
-                            f"{advice}"
+                            f"librealsense lists no devices within {_LONGEST_LISTING_S:g} s", advice
                         ) from error
         finally:
             child.kill()  # if it has not ended; a hung SDK outlives Ctrl+C
@@ -193,10 +192,10 @@ def devices_by_child(progress: Progress = Progress()) -> list[Device]:
     except ValueError as error:
         last = complaint.strip().rpartition("\n")[2][:_MOST_CHARACTERS]
         why = ", ".join(filter(None, (f"status {child.returncode}", last)))
-        raise CameraError(f"librealsense crashed ({why}): {advice}") from error
-    if isinstance(listed, str):
-        raise CameraError(listed)
-    return [Device(**device) for device in listed]
+        raise CameraError(f"librealsense crashed ({why})", advice) from error
+    if "error" in listed:
+        raise CameraError(*listed["error"])
+    return [Device(**device) for device in listed["devices"]]
 
 
 def describe_device(device: Any) -> Device:
@@ -228,12 +227,12 @@ def choose_device(devices: Sequence[Device], serial: str = "") -> Device:
         If it is not connected.
     """
     if not devices:
-        raise CameraError(explain_absence())
+        raise explain_absence()
     for device in devices:
         if serial in ("", device.serial):
             return device
     there = ", ".join(f"{device.name} {device.serial}" for device in devices)
-    raise CameraError(f"the RealSense with serial {serial} is not connected", f"there is {there}")
+    raise CameraError(f"the RealSense with serial {serial} is not connected, only {there}")
 
 
 def _line(text: str) -> str:
@@ -258,9 +257,9 @@ def _temperature_c(rs: Any, device: Any) -> float | None:
 def _main() -> None:
     """Print the connected devices, or the reason why there is no list, as one line of JSON."""
     try:
-        answer: object = [asdict(device) for device in connected_devices()]
+        answer: object = {"devices": [asdict(device) for device in connected_devices()]}
     except CameraError as error:
-        answer = str(error)
+        answer = {"error": error.args}
     sys.stdout.write(f"\n{json.dumps(answer)}")
 
 

@@ -118,7 +118,7 @@ class _Images(ViewpointCamera):
         try:
             image = read_image(path, cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION)
         except FileError as error:
-            raise CameraError(str(error)) from error
+            raise CameraError(*error.args) from error
         if self._playback.real_time:
             self._shown, self._until_s = image, time.monotonic() + _IMAGE_S
         return image, time.monotonic_ns()

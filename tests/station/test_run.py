@@ -59,7 +59,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
         depth_intrinsics=intrinsics,
         seed=1,
     )
-    record(camera, folder / "frames", RecordSettings(frames=30, free_bytes=0))
+    record(camera, folder / "frames", RecordSettings(frames=30))
     return folder / "frames"
 
 
