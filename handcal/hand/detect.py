@@ -28,6 +28,18 @@ _ENDS = [("image", "tensor(uint8)"), ("raw", "tensor(float)")]
 _GRAY = 127  # value of the network's zero padding
 # Share of the largest scale. For 16:9 it saves an eighth of the canvas, much of it gray.
 _LARGE_ENOUGH = 0.95
+# Intersections over union: above the first, of two hands the one with the lower score is dropped;
+# from the second on, a candidate has a vote on the best one's box, the mean of all that have,
+# weighted by score (box voting, Gidaris & Komodakis 2015).
+_OVERLAP_MAX, _AGREEMENT_MIN = 0.4, 0.6
+_MOST_HANDS = 100  # as in COCO's average precision
+# An image is dim if its `DIM_PERCENTILE` of the pixels' brightest channel is below the first; a
+# gain raises that to the second. A larger gain would show noise rather than hands.
+_DIM_BELOW, _BRIGHT, _GAIN_MAX = 160, 240, 4.0
+# A second look is taken if the surest hand's score is in this range, and the square root of its
+# share of the image at least that size. It has few pixels, because the network sees all fingers of
+# a large hand only on a small image. Its margin is a multiple of the hand's longer side.
+_UNSURE, _SECOND_SIZE_MIN, _SECOND_MARGIN, _SECOND_PIXELS = (0.2, 0.7), 0.1, 0.5, 18_432
 _NEAR = 0.1  # least overlap of what a second look may add to the hand that it is about
 
 
@@ -39,30 +51,6 @@ class DetectSettings:
     """Largest number of pixels of the network's input; the image is scaled to it."""
     score_min: float = 0.3
     """Lowest score of a returned hand; at least `CANDIDATE_SCORE_MIN`."""
-    overlap_max: float = 0.4
-    """Largest intersection over union of two hands; above it the one with the lower score is
-    dropped."""
-    agreement_min: float = 0.6
-    """Least intersection over union with the best candidate for a vote: a hand's box is the mean of
-    those candidates, weighted by score, regardless of `score_min` (box voting, Gidaris & Komodakis
-    2015)."""
-    hands: int = 100
-    """Largest number of hands returned, as in COCO's average precision."""
-    dim_below: int = 160
-    """An image is dim if its `DIM_PERCENTILE` of the pixels' brightest channel is below this."""
-    bright: int = 240
-    """The value to which the gain on a dim image raises that percentile."""
-    gain_max: float = 4.0
-    """Largest gain; more would show noise rather than hands."""
-    unsure: tuple[float, float] = (0.2, 0.7)
-    """A second look is taken if the surest hand's score is in this range."""
-    second_size_min: float = 0.1
-    """Least size of that hand, as the square root of its share of the image."""
-    second_margin: float = 0.5
-    """Margin of the second look around that hand, as a multiple of its longer side."""
-    second_pixels: int = 18_432
-    """Pixels of the second look: few, because the network sees all fingers of a large hand only on
-    a small image."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,22 +116,22 @@ class HandDetector:
         if pixels is not None:
             return _at_least(self._settings.score_min, self._look(color, pixels))
         found = self._look(color, self._settings.pixels)
-        part = _unsure_part(found, color.shape[:2], self._settings)
+        part = _unsure_part(found, color.shape[:2])
         if part is not None:
             x0, y0, x1, y1 = part
-            again = self._look(color[y0:y1, x0:x1], self._settings.second_pixels)
+            again = self._look(color[y0:y1, x0:x1], _SECOND_PIXELS)
             again = Detections(again.boxes_px + np.array([x0, y0, x0, y0]), again.scores)
-            found = _with_second(found, again, self._settings.agreement_min)
+            found = _with_second(found, again)
         return _at_least(self._settings.score_min, found)
 
     def _look(self, color: UInt8, pixels: int) -> Detections:
         """Run the network once; the scores are at least the lowest that a second look needs."""
-        settings = self._settings
         canvas, scale = letterbox(color, pixels)
         _, (width, height), _ = _fit(*color.shape[:2], pixels)
-        canvas[:height, :width] = brightened(canvas[:height, :width], settings)
+        canvas[:height, :width] = brightened(canvas[:height, :width])
         [raw] = self._session.run(["raw"], {"image": canvas[None]})
-        lowest = replace(settings, score_min=min(settings.score_min, settings.unsure[0]))
+        settings = self._settings
+        lowest = replace(settings, score_min=min(settings.score_min, _UNSURE[0]))
         boxes, scores = decode(raw, canvas.shape[:2], lowest)
         return Detections(boxes / scale, scores)
 
@@ -187,7 +175,7 @@ def letterbox(color: UInt8, pixels: int) -> tuple[UInt8, float]:
     return canvas, scale
 
 
-def brightened(color: UInt8, settings: DetectSettings) -> UInt8:
+def brightened(color: UInt8) -> UInt8:
     """Return an image multiplied by a gain if it is dim; a bright one is returned as it is.
 
     The network has seen few dim images. Of the pixels' brightest channel, `DIM_PERCENTILE` decides.
@@ -195,9 +183,9 @@ def brightened(color: UInt8, settings: DetectSettings) -> UInt8:
     rare = color[::2, ::2]
     brightest = np.maximum(np.maximum(rare[..., 0], rare[..., 1]), rare[..., 2])
     value = float(np.percentile(brightest, DIM_PERCENTILE))
-    if value >= settings.dim_below:
+    if value >= _DIM_BELOW:
         return color
-    gain = min(settings.gain_max, settings.bright / max(value, 1.0))
+    gain = min(_GAIN_MAX, _BRIGHT / max(value, 1.0))
     return np.asarray(cv2.convertScaleAbs(color, alpha=gain), np.uint8)
 
 
@@ -260,31 +248,29 @@ def decode(
     boxes = np.stack([at[:, 0] - left, at[:, 1] - top, at[:, 0] + right, at[:, 1] + bottom], axis=1)
     scores = 1.0 / (1.0 + np.exp(-raw[0, kept].astype(np.float64)))
     sure = boxes[: np.count_nonzero(scores >= settings.score_min)]
-    chosen = _suppress(sure, settings.overlap_max, settings.hands)
-    votes = (overlaps(boxes[chosen], boxes) >= settings.agreement_min) * scores
+    chosen = _suppress(sure)
+    votes = (overlaps(boxes[chosen], boxes) >= _AGREEMENT_MIN) * scores
     return votes @ boxes / votes.sum(axis=1, keepdims=True), scores[chosen]
 
 
-def _unsure_part(
-    found: Detections, shape: tuple[int, ...], settings: DetectSettings
-) -> tuple[int, int, int, int] | None:
+def _unsure_part(found: Detections, shape: tuple[int, ...]) -> tuple[int, int, int, int] | None:
     """Return the surroundings of the surest hand as x0, y0, x1, y1; None if it is sure or small."""
-    least, sure = settings.unsure
+    least, sure = _UNSURE
     if not len(found.scores) or not least <= found.scores[0] < sure:
         return None
     height, width = shape[:2]
     box = found.boxes_px[0]
     sides = box[2:] - box[:2]
-    if np.prod(sides) < settings.second_size_min**2 * height * width:
+    if np.prod(sides) < _SECOND_SIZE_MIN**2 * height * width:
         return None
-    margin = settings.second_margin * sides.max()
+    margin = _SECOND_MARGIN * sides.max()
     low = np.floor(box[:2] - margin).clip(0, [width - 1, height - 1])
     high = np.ceil(box[2:] + margin).clip(low + 1, [width, height])
     x0, y0, x1, y1 = np.concatenate([low, high]).astype(int).tolist()
     return x0, y0, x1, y1
 
 
-def _with_second(first: Detections, second: Detections, agreement_min: float) -> Detections:
+def _with_second(first: Detections, second: Detections) -> Detections:
     """Add what a second look saw of the surest hand.
 
     Boxes that agree are averaged, weighted by score. Both are kept of two that do not: one around
@@ -295,7 +281,7 @@ def _with_second(first: Detections, second: Detections, agreement_min: float) ->
     for box, score in zip(second.boxes_px[about], second.scores[about], strict=True):
         shared = overlaps(box[None], boxes)[0]
         best = int(shared.argmax())
-        if shared[best] < agreement_min:
+        if shared[best] < _AGREEMENT_MIN:
             boxes, scores = np.vstack([boxes, box]), np.append(scores, score)
             continue
         boxes[best] = (scores[best] * boxes[best] + score * box) / (scores[best] + score)
@@ -320,13 +306,13 @@ def overlaps(boxes: Float64, others: Float64) -> Float64:
     return result
 
 
-def _suppress(boxes: Float64, overlap_max: float, most: int) -> list[int]:
+def _suppress(boxes: Float64) -> list[int]:
     """Return the indices of boxes, sorted best first, that overlap no better one."""
     chosen: list[int] = []
     remaining = np.arange(len(boxes))
-    while len(remaining) and len(chosen) < most:
+    while len(remaining) and len(chosen) < _MOST_HANDS:
         best, remaining = remaining[0], remaining[1:]
         chosen.append(int(best))
-        apart = overlaps(boxes[best : best + 1], boxes[remaining])[0] <= overlap_max
+        apart = overlaps(boxes[best : best + 1], boxes[remaining])[0] <= _OVERLAP_MAX
         remaining = remaining[apart]
     return chosen

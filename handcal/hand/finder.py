@@ -12,13 +12,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handcal.core.errors import HandError
+from handcal.core.errors import HandError, OutOfViewError
 from handcal.core.geometry import camera_matrix, image_points, invert, transform
 from handcal.core.types import Bool, Float64, Frame, HandCloud, Intrinsics, UInt8
 from handcal.hand.detect import Detections, overlaps
 from handcal.hand.segment import segment_hand, segmented_window
-from handcal.hand.settings import NEARER_M, Roi, RoiSettings, SegmentSettings
-from handcal.hand.view import BEYOND, Box, between, deproject, gate_problem, pixels_of, view_depth
+from handcal.hand.settings import NEARER_M, Roi, SegmentSettings
+from handcal.hand.view import Box, between, deproject, gate_problem, pixels_of, view_depth
 
 STEP_PX = 8
 """Step of the coarse image, in pixels of the depth image: fine enough to locate a hand."""
@@ -32,6 +32,9 @@ _CROSSES = 0.1  # share of a hand beyond the gate that may leave too little of i
 _OBJECT_MIN, _AROUND_MAX, _OBJECT_DEPTH, _TOO_LARGE = 0.3, 0.5, 0.25, 1.3
 _SHIFTS, _STILL_PX = 3, 1.0
 _MEASURED_MIN = 0.1  # least share of a box with depth, to say how far it is
+# Range of the square root of the area of a hand's box, at its depth, and the least share of the box
+# at that depth.
+_SIDE_M, _FILLED_MIN = (0.05, 0.30), 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,40 +76,35 @@ class CoarseCloud:
         offset = self._px[inside].mean(0) - center(box)
         return Track(score, box, depth_m, offset, int(np.count_nonzero(inside)))
 
-    def problem(self, color_box: Float64, settings: RoiSettings) -> str:
+    def problem(self, color_box: Float64) -> HandError:
         """Return why a box of the colour image holds no object of its size within the gate."""
         rows, columns = pixels_of(self._view.depth > 0)
         inside = inside_box(self._color_px(rows, columns), color_box)
         depth_m = self._view.depth[rows, columns][inside] * self._view.scale_m
         area_px = float(np.prod(color_box[2:] - color_box[:2]))
         if len(depth_m) < max(_PIXELS_MIN, _MEASURED_MIN * area_px / STEP_PX**2):
-            return (
-                "the depth camera measures nothing where the hand is; move it back, or out of "
-                "strong light"
+            return HandError(
+                "the depth camera measures nothing where the hand is",
+                "move it back, or out of strong light",
             )
         gate_m = self._gate_m[0] + NEARER_M, self._gate_m[1]
         nearest_m = np.quantile(depth_m, 0.1)
         depth_m = depth_m[depth_m < nearest_m + _DEPTH_SPREAD_M]
         hand_m = float(np.median(depth_m))
         side_m = float(np.sqrt(area_px)) * hand_m / self._color_camera.fx
-        if side_m < settings.side_min_m:
-            return (
-                f"a hand at the measured {hand_m:.2f} m would be only {100 * side_m:.0f} cm large: "
-                "depth is in a wrong unit; correct the depth scale of the camera or recording"
-            )
-        if hand_m >= gate_m[0] and side_m > settings.side_max_m:
+        if side_m < _SIDE_M[0]:
+            return _wrong_unit(hand_m, f"only {100 * side_m:.0f} cm")
+        if hand_m >= gate_m[0] and side_m > _SIDE_M[1]:
             if not self._is_object(color_box):
-                return (
+                return HandError(
                     f"the depth camera measures only the background, at {hand_m:.2f} m, where the "
-                    "hand is; the hand may be too near: move it back"
+                    "hand is",
+                    "the hand may be too near: move it back",
                 )
-            if side_m > _TOO_LARGE * settings.side_max_m:
-                return (
-                    f"a hand at the measured {hand_m:.2f} m would be {side_m:.1f} m large: depth "
-                    "is in a wrong unit; correct the depth scale of the camera or recording"
-                )
-        return gate_problem(depth_m, gate_m, _CROSSES) or (
-            "most of the hand is hidden or without depth; show all of it to the camera"
+            if side_m > _TOO_LARGE * _SIDE_M[1]:
+                return _wrong_unit(hand_m, f"{side_m:.1f} m")
+        return gate_problem(depth_m, gate_m, _CROSSES) or HandError(
+            "most of the hand is hidden or without depth", "show all of it to the camera"
         )
 
     def _is_object(self, color_box: Float64) -> bool:
@@ -118,7 +116,7 @@ class CoarseCloud:
         nearest = np.quantile(depth[inside], 0.1)
         near = depth < (1.0 + _OBJECT_DEPTH) * nearest
         wider = inside_box(px, color_box + np.concatenate([-wider_px, wider_px]))
-        filled, around = (np.count_nonzero(near & one) for one in (inside, wider & ~inside))
+        filled, around = (np.count_nonzero(near & part) for part in (inside, wider & ~inside))
         area = float(np.prod(color_box[2:] - color_box[:2])) / STEP_PX**2
         return bool(filled > max(_OBJECT_MIN * area, around / _AROUND_MAX))
 
@@ -182,6 +180,13 @@ class CoarseCloud:
         return _moved(box, depth_m, self.camera, self._color_camera, self._T_C_D)
 
 
+def _wrong_unit(hand_m: float, size: str) -> HandError:
+    return HandError(
+        f"a hand at the measured {hand_m:.2f} m would be {size} large: depth is in a wrong unit",
+        "correct the depth scale of the camera or recording",
+    )
+
+
 def inside_box(px: Float64, box: Float64) -> Bool:
     """Return which of (N, 2) pixels lie in a box, (N,)."""
     x, y = px.T
@@ -207,7 +212,16 @@ def _moved(
 
 
 _SAME_OVERLAP = 0.3
-_NOT_SEEN = "no hand is seen in the colour image; raise the bare hand in front of the camera"
+_NOT_SEEN = HandError(
+    "no hand is seen in the colour image", "raise the bare hand in front of the camera"
+)
+_SURE_MIN = 0.7  # least score of a hand, as a share of the highest score
+# While a hand is tracked, the detector looks at it again after this time, with this margin (a
+# multiple of the longer side of its box) and so few pixels, because it does so often; it is dropped
+# after so many looks in a row without a detection. Times are rounded to frames.
+_CHECK_S, _CHECK_MARGIN, _CHECK_PIXELS, _MISSES = 0.19, 0.5, 25_600, 2
+# Between looks at the whole image: without a hand, and while the tracked one may be the wrong one.
+_SEARCH_S, _CHOOSE_S = 0.06, 1.0
 
 
 class Detector(Protocol):
@@ -228,28 +242,21 @@ class RoiFinder:
     detector : Detector
     segmenting : SegmentSettings
         Its depth gate limits the search; its `roi` selects among several hands.
-    settings : RoiSettings, optional
 
     Attributes
     ----------
-    problem : str
+    problem : HandError
         Why the last frame gave no hand, and what to do.
     """
 
-    def __init__(
-        self,
-        detector: Detector,
-        segmenting: SegmentSettings,
-        settings: RoiSettings | None = None,
-    ) -> None:
+    def __init__(self, detector: Detector, segmenting: SegmentSettings) -> None:
         self._detector = detector
         self.problem = _NOT_SEEN
         self._gate_m = segmenting.depth_min_m - NEARER_M, segmenting.depth_max_m
         self._wanted = segmenting.roi
-        self._settings = settings or RoiSettings()
         self._track: Track | None = None
         self._misses = 0
-        self._seen_ns: int | None = None
+        self._former_ns: int | None = None
         self._looked_ns: int | None = None
         self._chosen_ns = 0
 
@@ -258,15 +265,16 @@ class RoiFinder:
         if frame.color is None:
             return None
         now_ns = frame.t_camera_ns
-        if self._seen_ns is None or now_ns < self._seen_ns:
+        if self._former_ns is None or now_ns < self._former_ns:
             self._track = self._looked_ns = None  # a recording has started or restarted
-            self._seen_ns = now_ns
-        half_frame_ns, self._seen_ns = (now_ns - self._seen_ns) / 2, now_ns
+            self._former_ns = now_ns
+        # A look is taken in the frame nearest to its time, which may be half a frame early.
+        half_frame_ns, self._former_ns = (now_ns - self._former_ns) / 2, now_ns
         cloud = CoarseCloud(frame, self._gate_m)
         self._track = self._track and cloud.follow(self._track)
-        wait_s = self._settings.search_s
+        wait_s = _SEARCH_S
         if self._track is not None and not self._misses:
-            wait_s = self._settings.check_s
+            wait_s = _CHECK_S
         if self._looked_ns is None or now_ns - self._looked_ns >= wait_s * 1e9 - half_frame_ns:
             self._looked_ns = now_ns
             self._look(frame.color, cloud, now_ns)
@@ -274,15 +282,15 @@ class RoiFinder:
 
     def _look(self, color: UInt8, cloud: CoarseCloud, now_ns: int) -> None:
         """Run the detector to confirm the track, drop it, or start one."""
-        confirmed = self._track and self._confirm(self._track, color, cloud)
+        confirmed = self._track and self._confirm(self._track, color, cloud)[0]
         if confirmed is not None:
             self._track, self._misses = confirmed, 0
-            is_due = now_ns - self._chosen_ns >= self._settings.choose_s * 1e9
+            is_due = now_ns - self._chosen_ns >= _CHOOSE_S * 1e9
             if not (is_due and cloud.may_precede(confirmed, self._wanted)):
                 return
         elif self._track is not None:
             self._misses += 1
-            if self._misses < self._settings.misses:
+            if self._misses < _MISSES:
                 return
         self._misses = 0
         self._chosen_ns = now_ns
@@ -294,63 +302,69 @@ class RoiFinder:
         A hand seen only in the whole image would soon be dropped and detected again.
         """
         height, width = color.shape[:2]
-        self.problem = _NOT_SEEN
-        hands = self._hands(color, (0, 0, width, height), None, cloud)
-        least = self._settings.sure_min * max((hand.score for hand in hands), default=0.0)
-        sure = sorted((hand for hand in hands if hand.score >= least), key=self._order)
-        confirmed = (self._confirm(hand, color, cloud) for hand in sure)
-        return next(filter(None, confirmed), None)
+        hands, problem = self._hands(color, (0, 0, width, height), None, cloud)
+        least = _SURE_MIN * max((hand.score for hand in hands), default=0.0)
+        confirmed = None
+        for hand in sorted((hand for hand in hands if hand.score >= least), key=self._order):
+            confirmed, doubt = self._confirm(hand, color, cloud)
+            problem = problem or doubt
+            if confirmed is not None:
+                break
+        self.problem = problem or _NOT_SEEN
+        return confirmed
 
-    def _confirm(self, track: Track, color: UInt8, cloud: CoarseCloud) -> Track | None:
-        """Return the track as updated by the detector; None if it sees no hand there."""
-        part = cloud.surroundings(track, self._settings.check_margin)
-        hands = self._hands(color, part, self._settings.check_pixels, cloud)
-        return next((hand for hand in hands if _overlap(hand, track) >= _SAME_OVERLAP), None)
+    def _confirm(
+        self, track: Track, color: UInt8, cloud: CoarseCloud
+    ) -> tuple[Track | None, HandError | None]:
+        """Return the track as updated by the detector, or why it sees no hand there, if known."""
+        part = cloud.surroundings(track, _CHECK_MARGIN)
+        hands, problem = self._hands(color, part, _CHECK_PIXELS, cloud)
+        same = (hand for hand in hands if _overlap(hand, track) >= _SAME_OVERLAP)
+        return next(same, None), problem
 
     def _hands(
         self, color: UInt8, part: Box, pixels: int | None, cloud: CoarseCloud
-    ) -> list[Track]:
-        """Return the plausible hands detected in a part of the image."""
+    ) -> tuple[list[Track], HandError | None]:
+        """Return the plausible hands in a part of the image, and why the surest other is none."""
         x0, y0, x1, y1 = part
-        found = self._detector.detect(color[y0:y1, x0:x1], pixels)
-        boxes = found.boxes_px + np.array([x0, y0, x0, y0])
+        detections = self._detector.detect(color[y0:y1, x0:x1], pixels)
+        boxes = detections.boxes_px + np.array([x0, y0, x0, y0])
         hands: list[Track] = []
         beyond: list[Float64] = []
-        for box, score in zip(boxes, found.scores, strict=True):
+        first_problem: HandError | None = None
+        for box, score in zip(boxes, detections.scores, strict=True):
             if any(inside_box(center(box)[None], other).any() for other in beyond):
                 continue  # a part of that hand
             hand = cloud.track(box, float(score))
-            problem = self._problem(hand, box, cloud)
-            if hand is None or problem:
-                if problem.startswith(BEYOND):
+            problem = _problem(hand, box, cloud)
+            if hand is None or problem is not None:
+                if isinstance(problem, OutOfViewError):
                     beyond.append(box)
-                if self.problem == _NOT_SEEN:  # that of the surest
-                    self.problem = problem
-                continue
-            if not any(_on_one_hand(hand, surer) for surer in hands):
+                first_problem = first_problem or problem  # the surest come first
+            elif not any(_on_one_hand(hand, surer) for surer in hands):
                 hands.append(hand)
-        return hands
-
-    def _problem(self, track: Track | None, color_box: Float64, cloud: CoarseCloud) -> str:
-        """Return why the content of a box is not of a hand's size or does not fill the box."""
-        settings = self._settings
-        if track is None:
-            return cloud.problem(color_box, settings)
-        side_px = np.sqrt(np.prod(track.box[2:] - track.box[:2]))
-        side_m = float(side_px * track.depth_m / cloud.camera.fx)
-        if not settings.side_min_m <= side_m <= settings.side_max_m:
-            return (
-                f"what looks like a hand {track.depth_m:.2f} m away is {100 * side_m:.0f} cm "
-                "large; show the bare hand"
-            )
-        if track.pixels * STEP_PX**2 < settings.filled_min * side_px**2:
-            return cloud.problem(color_box, settings)
-        return ""
+        return hands, first_problem
 
     def _order(self, track: Track) -> float:
         if self._wanted in ("left", "right"):
             return float(track.box[0] if self._wanted == "left" else -track.box[2])
         return track.depth_m
+
+
+def _problem(track: Track | None, color_box: Float64, cloud: CoarseCloud) -> HandError | None:
+    """Return why the content of a box is not of a hand's size or does not fill the box."""
+    if track is None:
+        return cloud.problem(color_box)
+    side_px = np.sqrt(np.prod(track.box[2:] - track.box[:2]))
+    side_m = float(side_px * track.depth_m / cloud.camera.fx)
+    if not _SIDE_M[0] <= side_m <= _SIDE_M[1]:
+        return HandError(
+            f"what looks like a hand {track.depth_m:.2f} m away is {100 * side_m:.0f} cm large",
+            "show the bare hand",
+        )
+    if track.pixels * STEP_PX**2 < _FILLED_MIN * side_px**2:
+        return cloud.problem(color_box)
+    return None
 
 
 def _on_one_hand(track: Track, other: Track) -> bool:
@@ -399,7 +413,7 @@ class HandFinder:
             return segment_hand(frame, self._settings)
         roi_px = self._roi.find(frame)
         if roi_px is None:
-            raise HandError(self._roi.problem)
+            raise HandError(*self._roi.problem.args)
         camera = frame.depth_intrinsics
         hand = segment_hand(frame, self._settings, roi_px)
         if not _is_within(hand.box_px, segmented_window(roi_px, camera, self._settings), camera):

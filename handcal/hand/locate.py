@@ -31,6 +31,7 @@ from handcal.hand.view import (
     on_border,
     pixels_of,
     solid_surface,
+    widened,
 )
 
 _LEAST_COS = 0.5  # of the angle between the axis and the image plane
@@ -75,7 +76,7 @@ _AT_M = np.asarray(
 )
 
 
-def arm_fit(
+def _arm_fit(
     from_palm_m: Float32,
     area_m2: Float32,
     at_end: Bool,
@@ -87,12 +88,8 @@ def arm_fit(
 
     It is that of all places of the wrist together, in units of the palm's size: a limb that begins
     with a forearm does not become narrower, and then suddenly wider. NaN if the axis points along
-    the line of sight, so that nothing behind the palm is seen in its width.
-
-    Parameters
-    ----------
-    from_palm_m, area_m2, at_end, palm_m, palm_radius_m, axis
-        See `find_wrist_m`.
+    the line of sight, so that nothing behind the palm is seen in its width. The parameters are
+    those of `find_wrist_m`.
     """
     cosine = _cosine(axis, palm_m)
     if cosine <= _LEAST_COS:
@@ -108,7 +105,7 @@ def arm_fit(
     return float(np.log(likely.sum() + _NEVER))
 
 
-def box_exit_m(view: DepthView, box: Box, palm_m: Float32, axis: Float32) -> float:
+def _box_exit_m(view: DepthView, box: Box, palm_m: Float32, axis: Float32) -> float:
     """Return the distance from the palm along the axis to the side of a box in the image."""
     camera = view.camera
     sides = (
@@ -120,7 +117,7 @@ def box_exit_m(view: DepthView, box: Box, palm_m: Float32, axis: Float32) -> flo
     rates = [float(axis[k] - tangent * axis[2]) for k, tangent in sides]
     gaps_m = [float(tangent * palm_m[2] - palm_m[k]) for k, tangent in sides]
     exits_m = (gap / rate for gap, rate in zip(gaps_m, rates, strict=True) if abs(rate) > 1e-6)
-    return min((one for one in exits_m if one > 0.0), default=np.inf)
+    return min((exit_m for exit_m in exits_m if exit_m > 0.0), default=np.inf)
 
 
 def find_wrist_m(
@@ -271,26 +268,25 @@ _ALONG_GATE_M, _BEYOND_MIN, _BEYOND_MAX = 0.008, 0.01, 0.5
 # Within and without the gate it is the same hand if neither palm nor area differs by more.
 _FAR_UNIT = 2.0  # with nothing nearer than so many times the gate's end its unit may be wrong
 _ONE_HAND_M, _ONE_HAND_AREA = 0.01, 0.03
+# What is wrong, and what to do about it.
+_TURN = "turn its palm or its back to the camera"
 _NOT_A_HAND = (
-    "what the detector takes for a hand is not shaped like one in the depth image; show the whole "
-    "bare hand, clear of other things"
+    "what the detector takes for a hand is not shaped like one in the depth image",
+    "show the whole bare hand, clear of other things",
 )
 _TOO_SMALL = (
-    "the hand is too small, or only a part of it is seen in the depth image; show the whole bare "
-    "hand, clear of other things"
+    "the hand is too small, or only a part of it is seen in the depth image",
+    "show the whole bare hand, clear of other things",
 )
-_SMALL_OR_FROM_EDGE = (
-    "the hand is smaller than a six-year-old's, or seen from its edge; turn its palm or its back "
-    "to the camera"
-)
-_FROM_EDGE = "the hand is seen from its edge; turn its palm or its back to the camera"
+_SMALL_OR_FROM_EDGE = "the hand is smaller than a six-year-old's, or seen from its edge", _TURN
+_FROM_EDGE = "the hand is seen from its edge", _TURN
 _EITHER_END = (
-    "the hand cannot be told from the arm in the depth image; turn its palm or its back to the "
-    "camera, spread the fingers, and show more of the arm"
+    "the hand cannot be told from the arm in the depth image",
+    f"{_TURN}, spread the fingers, and show more of the arm",
 )
 _NO_WRIST = (
-    "the wrist cannot be found in the depth image; turn the palm or the back of the hand to the "
-    "camera"
+    "the wrist cannot be found in the depth image",
+    "turn the palm or the back of the hand to the camera",
 )
 
 Labels: TypeAlias = NDArray[np.int32]
@@ -398,7 +394,8 @@ def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = No
             raise problem
         return located if located is not None and _are_one(located, whole) else whole
     if move := gate_problem(depth_m, gate_m, 0.0 if whole.leaves_gate else _BEYOND_MAX):
-        raise OutOfViewError(move + ("" if box else _unit_hint(view, settings)))
+        hint = "" if box else _unit_hint(view, settings)
+        raise OutOfViewError(move.what, move.advice + hint)
     return whole
 
 
@@ -439,7 +436,7 @@ def _locate_within(
         elif _has_palm(located):
             problem = _TOO_SMALL
     if found is None and box is not None:
-        raise HandError(problem)
+        raise HandError(*problem)
     if found is None:
         raise HandError(
             f"no hand-sized object between {settings.depth_min_m:.2f} and "
@@ -459,7 +456,7 @@ def _locate_within(
 
 def _are_one(located: LocatedHand, other: LocatedHand) -> bool:
     """Return whether two results in one image are the same hand."""
-    areas = [np.count_nonzero(one.hand) for one in (located, other)]
+    areas = [np.count_nonzero(hand.hand) for hand in (located, other)]
     apart_m = float(np.linalg.norm(located.palm_m - other.palm_m))
     return apart_m < _ONE_HAND_M and bool(min(areas) > (1.0 - _ONE_HAND_AREA) * max(areas))
 
@@ -471,12 +468,12 @@ def _unit_hint(view: DepthView, settings: SegmentSettings) -> str:
         return ""
     nearest_m, farthest_m = np.quantile(measured, [0.02, 0.98]) * view.scale_m
     if nearest_m > _FAR_UNIT * settings.depth_max_m:
-        what = f"nearer than {nearest_m:.1f} m"
+        where = f"nearer than {nearest_m:.1f} m"
     elif farthest_m < settings.depth_min_m:
-        what = f"farther than {farthest_m:.2f} m"
+        where = f"farther than {farthest_m:.2f} m"
     else:
         return ""
-    return f" (nothing is measured {what}: if a hand is in view, correct the unit of depth)"
+    return f" (nothing is measured {where}: if a hand is in view, correct the unit of depth)"
 
 
 def _pitch(view: DepthView) -> float:
@@ -503,13 +500,13 @@ def _check_wrist(located: LocatedHand) -> None:
     seen_m = (EDGE_RADIUS_M, FACING_RADIUS_M)
     if located.limit_sigma_m > np.interp(located.palm_radius_m, seen_m, _LIMIT_SIGMAS_M):
         if located.palm_radius_m >= _FROM_EDGE_M:
-            raise HandError(_NO_WRIST)
+            raise HandError(*_NO_WRIST)
         points_m = deproject(located.view, *pixels_of(located.hand)).T
         reach_m = -np.percentile((points_m - located.palm_m) @ located.axis, 1.0)
         is_short = reach_m < _SHORT * located.palm_radius_m
-        raise HandError(_SMALL_OR_FROM_EDGE if is_short else _FROM_EDGE)
+        raise HandError(*(_SMALL_OR_FROM_EDGE if is_short else _FROM_EDGE))
     if located.end_log_odds < _SURE:
-        raise HandError(_EITHER_END)
+        raise HandError(*_EITHER_END)
 
 
 def _check_covered(located: LocatedHand) -> None:
@@ -534,7 +531,7 @@ def _check_arm(located: LocatedHand, within: Float32) -> None:
     """Raise HandError if much of what is in the middle of a hand's box would be arm."""
     arm, hand = (float(within[part].sum()) for part in (located.arm, located.hand))
     if arm > _ARM_IN_BOX_MAX * (arm + hand):
-        raise HandError(_NO_WRIST)
+        raise HandError(*_NO_WRIST)
 
 
 def _within(view: DepthView, box: Box) -> Float32:
@@ -597,19 +594,14 @@ def _limb(parts: _Parts, main: int) -> tuple[_Limb, tuple[slice, slice]]:
 def _joined(parts: _Parts, surface: Bool, may_join: Bool, gap_px: int, jump_m: Float64) -> Bool:
     """Return a surface with those parts beside it that are no more than `jump_m`, (N,), off it."""
     view, is_limb = parts.view, np.zeros(len(parts.stats), bool)
-    near = _widened(surface, gap_px)
+    near = widened(surface, gap_px)
     beside = np.bincount(parts.labels[near], minlength=len(parts.stats)) > 0
     for part in np.flatnonzero(may_join & beside):
         other = near & (parts.labels == part)
-        opposite = surface & _widened(other, gap_px)
+        opposite = surface & widened(other, gap_px)
         jump = view.depth[other].mean() - view.depth[opposite].mean()
         is_limb[part] = abs(jump) * view.scale_m <= jump_m[part]
     return surface | is_limb[parts.labels]
-
-
-def _widened(mask: Bool, by_px: int) -> Bool:
-    square = np.ones((2 * by_px + 1, 2 * by_px + 1), np.uint8)
-    return cv2.dilate(mask.view(np.uint8), square).view(bool)
 
 
 def _locate_on(
@@ -629,7 +621,7 @@ def _locate_on(
         palm_m, palm_radius_m = _palm(limb, likely)
         axis = _axis(points_m - palm_m[:, None], area_m2, _arm_end(limb) - palm_m)
     from_palm_m = points_m - palm_m[:, None]
-    exit_m = np.inf if box is None else box_exit_m(limb.view, box, palm_m, axis)
+    exit_m = np.inf if box is None else _box_exit_m(limb.view, box, palm_m, axis)
     wrist_m, wrist_sigma_m = find_wrist_m(
         from_palm_m, area_m2, limb.at_end, palm_m, palm_radius_m, axis, exit_m
     )
@@ -668,7 +660,7 @@ def _hand_end(limb: _Limb, area_m2: Float32) -> tuple[Float32, float, Float32, f
         palm_m, radius_m = _palm(limb, likely.astype(np.float32))
         from_palm_m = points_m - palm_m[:, None]
         axis = _axis(from_palm_m, area_m2, end_m - palm_m)
-        fit = arm_fit(from_palm_m, area_m2, limb.at_end, palm_m, radius_m, axis)
+        fit = _arm_fit(from_palm_m, area_m2, limb.at_end, palm_m, radius_m, axis)
         found.append((palm_m, radius_m, axis))
         scores.append((fit, _THICKER * float(np.log(thickness_m))))
     fits, thicker = np.subtract(scores[0], scores[1]).clip(-_COUNTS, _COUNTS).tolist()

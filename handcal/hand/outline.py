@@ -12,7 +12,7 @@ where that changes: the cheapest path around the hand, by dynamic programming.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Self, TypeAlias
+from typing import TypeAlias
 
 import cv2
 import numpy as np
@@ -252,16 +252,19 @@ def with_outline(cloud: HandCloud, frame: Frame, edges: DepthEdges) -> HandCloud
         From which the hand was segmented.
     edges : DepthEdges
     """
-    contour = _Contour.of(cloud.contour_m.astype(np.float64), frame.depth_intrinsics)
-    seen = _seen_in_color(contour, cloud, frame, edges) if frame.color is not None else None
-    if seen is None:
-        move_px, sigma_px = edges.fatten_px * contour.inward, edges.sigma_px
-    else:
-        move_px, sigma_px = seen
-    px_m = cloud.median_depth_m / frame.depth_intrinsics.fx
-    move_px = move_px - _TURNED_RIM_M / px_m * contour.inward
-    outline_m = contour.moved(move_px, cloud.contour_is_cut)
-    outline_m *= 1.0 + _beyond_border_m(cloud, frame.depth_intrinsics, edges) / outline_m[:, 2:]
+    camera = frame.depth_intrinsics
+    contour_m = cloud.contour_m.astype(np.float64)
+    inward = inward_normals(_places_px(contour_m, camera))
+    # What nothing in colour shows is where this camera's edges usually are.
+    move_px, sigma_px = edges.fatten_px * inward, edges.sigma_px
+    if frame.color is not None and (
+        moves := _to_color_edge(contour_m, inward, cloud, frame, edges)
+    ):
+        move_px, sigma_px = moves
+    px_m = cloud.median_depth_m / camera.fx
+    move_px = move_px - _TURNED_RIM_M / px_m * inward
+    outline_m = moved_contour(contour_m, camera, move_px, cloud.contour_is_cut)
+    outline_m *= 1.0 + _beyond_border_m(cloud, camera, edges) / outline_m[:, 2:]
     return replace(
         cloud,
         outline_m=outline_m.astype(np.float32),
@@ -283,10 +286,10 @@ def _beyond_border_m(cloud: HandCloud, intrinsics: Intrinsics, edges: DepthEdges
     return float(np.sqrt(2.0 * _FINGER_RADIUS_M * inside_px * px_m))
 
 
-def moved_inward(
-    contour_m: Float64, intrinsics: Intrinsics, by_px: float, is_cut: Bool | None = None
+def moved_contour(
+    contour_m: Float64, intrinsics: Intrinsics, move_px: Float64, is_cut: Bool
 ) -> Float64:
-    """Move a closed contour inward in the image, each point at its depth.
+    """Move a closed contour in the image, each point at its depth.
 
     Where the contour would fold, in sharp corners, the points follow their neighbours. A cut is no
     edge of the hand: only its ends move, with the silhouette that they adjoin.
@@ -297,88 +300,68 @@ def moved_inward(
         Closed, in order, in frame D.
     intrinsics : Intrinsics
         Of the depth camera.
-    by_px : float
-        Negative: outward.
-    is_cut : (N,) bool, optional
+    move_px : (N, 2) float64
+        Of each point, in pixels of the depth image.
+    is_cut : (N,) bool
         True on a cut edge.
 
     Returns
     -------
     (N, 3) float64
     """
-    contour = _Contour.of(np.asarray(contour_m, np.float64), intrinsics)
-    if is_cut is None:
-        is_cut = np.zeros(len(contour_m), np.bool_)
-    return contour.moved(by_px * contour.inward, is_cut)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Contour:
-    """A closed contour and its place in the image of an undistorted lens."""
-
-    points_m: Float64
-    """(N, 3); frame D."""
-    focal_px: Float64
-    """(2,)."""
-    place_px: Float64
-    """(N, 2); from the principal point."""
-    inward: Float64
-    """(N, 2); smoothed normals in the image, unit vectors."""
-
-    @classmethod
-    def of(cls, points_m: Float64, intrinsics: Intrinsics) -> Self:
-        focal_px = np.array([intrinsics.fx, intrinsics.fy])
-        place_px = points_m[:, :2] / points_m[:, 2:] * focal_px
-        return cls(points_m, focal_px, place_px, inward_normals(place_px))
-
-    def in_space(self, move_px: Float64) -> Float64:
-        """Return movements (N, 3) in metres, at each point's depth."""
-        move_m = np.zeros_like(self.points_m)
-        move_m[:, :2] = move_px / self.focal_px * self.points_m[:, 2:]
-        return move_m
-
-    def moved(self, move_px: Float64, is_cut: Bool) -> Float64:
-        """Return the points moved (N, 3), except where cuts or folds make them follow others."""
-        kept = ~_widened(is_cut)
-        before_px, after_px = (
-            np.roll(one, -_STEPS, axis=0) - np.roll(one, _STEPS, axis=0)
-            for one in (self.place_px, self.place_px + move_px)
+    place_px = _places_px(contour_m, intrinsics)
+    kept = ~_beside_cut(is_cut)
+    before_px, after_px = (
+        np.roll(contour_px, -_STEPS, axis=0) - np.roll(contour_px, _STEPS, axis=0)
+        for contour_px in (place_px, place_px + move_px)
+    )
+    kept &= np.einsum("ij,ij->i", before_px, after_px) > 0.0
+    if not kept.any():
+        return contour_m
+    at, known, turn = np.arange(len(kept)), np.flatnonzero(kept), len(kept)
+    if len(known) < turn:
+        move_px = np.column_stack(
+            [np.interp(at, known, axis_px, period=turn) for axis_px in move_px[known].T]
         )
-        kept &= np.einsum("ij,ij->i", before_px, after_px) > 0.0
-        if not kept.any():
-            return self.points_m
-        at, known, turn = np.arange(len(kept)), np.flatnonzero(kept), len(kept)
-        if len(known) < turn:
-            move_px = np.column_stack(
-                [np.interp(at, known, one, period=turn) for one in move_px[known].T]
-            )
-        return self.points_m + self.in_space(move_px)
+    return contour_m + _in_space_m(contour_m, intrinsics, move_px)
 
 
-def _seen_in_color(
-    contour: _Contour, cloud: HandCloud, frame: Frame, edges: DepthEdges
+def _places_px(points_m: Float64, intrinsics: Intrinsics) -> Float64:
+    """Return places (N, 2) in the image of an undistorted lens, from the principal point."""
+    return points_m[:, :2] / points_m[:, 2:] * [intrinsics.fx, intrinsics.fy]
+
+
+def _in_space_m(points_m: Float64, intrinsics: Intrinsics, move_px: Float64) -> Float64:
+    """Return movements (N, 3) in metres, at each point's depth."""
+    move_m = np.zeros_like(points_m)
+    move_m[:, :2] = move_px / [intrinsics.fx, intrinsics.fy] * points_m[:, 2:]
+    return move_m
+
+
+def _to_color_edge(
+    contour_m: Float64, inward: Float64, cloud: HandCloud, frame: Frame, edges: DepthEdges
 ) -> tuple[Float64, float] | None:
     """Return movements to the edge in colour (N, 2), in pixels, and their standard deviation.
 
     None if it cannot be seen along most of the silhouette, or not near enough: the hand may have
     moved between both images.
     """
-    smooth_px = _smoothed(contour.place_px, _STEP_SMOOTH_PX)
-    to_smooth_px = smooth_px - contour.place_px
-    px_m = cloud.median_depth_m / float(contour.focal_px[0])
-    found = find_color_edge(
+    camera = frame.depth_intrinsics
+    place_px = _places_px(contour_m, camera)
+    to_smooth_px = _smoothed(place_px, _STEP_SMOOTH_PX) - place_px
+    edge = find_color_edge(
         frame,
-        contour.points_m + contour.in_space(to_smooth_px),
-        contour.in_space(contour.inward),
-        px_m,
+        contour_m + _in_space_m(contour_m, camera, to_smooth_px),
+        _in_space_m(contour_m, camera, inward),
+        cloud.median_depth_m / camera.fx,
         edges.fatten_px,
     )
     is_silhouette = ~cloud.contour_is_cut
-    told = float(found.is_told[is_silhouette].mean()) if is_silhouette.any() else 0.0
-    if told < _LEAST_TOLD or found.beyond > _MOST_BEYOND:
+    told = float(edge.is_told[is_silhouette].mean()) if is_silhouette.any() else 0.0
+    if told < _LEAST_TOLD or edge.beyond > _MOST_BEYOND:
         return None
     sigma_px = told * _COLOR_SIGMA_PX + (1.0 - told) * edges.sigma_px
-    return to_smooth_px + found.inward_px[:, None] * contour.inward, sigma_px
+    return to_smooth_px + edge.inward_px[:, None] * inward, sigma_px
 
 
 def inward_normals(closed_px: Float64) -> Float64:
@@ -411,12 +394,12 @@ def _smoothed(closed_px: Float64, sigma: float) -> Float64:
     return np.fft.ifft(passed[:, None] * np.fft.fft(closed_px, axis=0), axis=0).real
 
 
-def _widened(is_cut: Bool) -> Bool:
+def _beside_cut(is_cut: Bool) -> Bool:
     """Return the points of a closed contour that are on a cut or at most `_BESIDE_CUT_PX` away."""
     around = np.ones(2 * _BESIDE_CUT_PX + 1)
     ends = np.pad(is_cut.astype(float), _BESIDE_CUT_PX, mode="wrap")
-    widened: Bool = np.convolve(ends, around, mode="valid") > 0.5
-    return widened
+    beside: Bool = np.convolve(ends, around, mode="valid") > 0.5
+    return beside
 
 
 # A finger tip is farther from the wrist than the gaps beside it by at least this much.

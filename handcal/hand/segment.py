@@ -26,6 +26,7 @@ from handcal.hand.view import (
     pixels_of,
     solid_surface,
     view_depth,
+    widened,
 )
 
 # Share of the hand's outline that may touch the image border.
@@ -39,7 +40,7 @@ _LEAST_CONTOUR_PX = 4  # a shorter contour encloses nothing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class HandMask:
+class _HandMask:
     """The hand in the depth image."""
 
     view: DepthView
@@ -57,16 +58,8 @@ class HandMask:
     """Approximate distance between neighbouring pixels on the hand."""
 
 
-def mask_hand(frame: Frame, located: LocatedHand, settings: SegmentSettings) -> HandMask:
-    """Mask a located hand at full resolution.
-
-    Raises
-    ------
-    OutOfViewError
-        If the image border cuts the hand.
-    HandError
-        If the depth image does not show the hand for another reason.
-    """
+def _mask_hand(frame: Frame, located: LocatedHand, settings: SegmentSettings) -> _HandMask:
+    """Mask a located hand at full resolution; raises as `segment_hand`."""
     view, is_hand, may_be_hand, may_be_arm = _full_resolution(located, frame)
     jump = round(settings.edge_jump_m / view.scale_m)
     pitch_m = float(located.palm_m[2]) / view.camera.fx
@@ -88,14 +81,14 @@ def mask_hand(frame: Frame, located: LocatedHand, settings: SegmentSettings) -> 
             )
         raise OutOfViewError("hand cut by the image border", "move it toward the middle")
     cut = on_border(surface) | goes_on(surface, solid & ~surface, view.depth, jump)
-    return HandMask(view, surface, filled, outline, cut, pitch_m)
+    return _HandMask(view, surface, filled, outline, cut, pitch_m)
 
 
 def _full_resolution(located: LocatedHand, frame: Frame) -> tuple[DepthView, Bool, Bool, Bool]:
     """Return the image around the hand, the coarse hand in it, and candidates of hand and arm."""
     coarse, place = crop_view(located.view, located.hand, margin=3)
     view = view_depth(frame, coarse.box)
-    hand, arm = (one[place].astype(np.uint8) for one in (located.hand, located.arm))
+    hand, arm = (mask[place].astype(np.uint8) for mask in (located.hand, located.arm))
     # Together, as each resampling takes as long as the rest.
     coded = _HAND * hand + _MAY_BE_HAND * _wider(hand) + _MAY_BE_ARM * _wider(arm)
     height, width = view.depth.shape
@@ -190,7 +183,7 @@ def segment_hand(frame: Frame, settings: SegmentSettings, roi_px: Box | None = N
     camera = frame.depth_intrinsics
     window = segmented_window(roi_px, camera, settings)
     located = locate_hand(view_depth(frame, window, _coarse_step_px(camera)), settings, roi_px)
-    return _cloud(frame, mask_hand(frame, located, settings), settings)
+    return _cloud(frame, _mask_hand(frame, located, settings), settings)
 
 
 def segmented_window(roi_px: Box | None, camera: Intrinsics, settings: SegmentSettings) -> Box:
@@ -214,7 +207,7 @@ def _coarse_step_px(camera: Intrinsics) -> int:
     return max(1, round(_COARSE_PITCH_M * camera.fx / _COARSE_DEPTH_M))
 
 
-def _cloud(frame: Frame, hand: HandMask, settings: SegmentSettings) -> HandCloud:
+def _cloud(frame: Frame, hand: _HandMask, settings: SegmentSettings) -> HandCloud:
     """Select points of the masked hand and compute their coordinates."""
     view = hand.view
     flying_behind = round(settings.flying_m / view.scale_m)
@@ -233,7 +226,7 @@ def _cloud(frame: Frame, hand: HandMask, settings: SegmentSettings) -> HandCloud
         t_camera_ns=frame.t_camera_ns,
         t_host_ns=frame.t_host_ns,
         points_m=points_m,
-        is_cut=_widened(hand.cut, round(settings.cut_band_m / hand.pitch_m))[chosen],
+        is_cut=widened(hand.cut, round(settings.cut_band_m / hand.pitch_m))[chosen],
         colors=_colors(frame, points_m, (chosen[0] + y0, chosen[1] + x0)),
         contour_m=deproject(view, *outline).T,
         contour_is_cut=hand.cut[outline],
@@ -253,12 +246,6 @@ def _even_choice(shape: tuple[int, ...], fraction: float) -> Bool:
     columns = np.arange(shape[1], dtype=np.uint16) * np.uint16(49472)
     chosen: Bool = rows[:, None] + columns <= np.uint16(min(fraction, 1.0) * 65535)
     return chosen
-
-
-def _widened(mask: Bool, by_px: int) -> Bool:
-    """Dilate a mask by a square with the given half side."""
-    square = np.ones((2 * by_px + 1, 2 * by_px + 1), np.uint8)
-    return cv2.dilate(mask.astype(np.uint8), square).astype(bool)
 
 
 def _colors(frame: Frame, points_m: Float32, pixels: Pixels) -> UInt8 | None:

@@ -70,31 +70,3 @@ class SegmentSettings:
 def usual_gate_m(model: str) -> tuple[float, float]:
     """Return the depth gate usual for a model of camera: a HoloLens 2's AHAT sees nearer hands."""
     return 0.20 if "AHAT" in model else SegmentSettings().depth_min_m, SegmentSettings().depth_max_m
-
-
-@dataclass(frozen=True, slots=True)
-class RoiSettings:
-    """Settings of choosing and tracking the hand.
-
-    Times are rounded to frames.
-    """
-
-    sure_min: float = 0.7
-    """Least score of a hand, as a share of the highest score."""
-    check_s: float = 0.19
-    """Time after which the detector checks a tracked hand again."""
-    check_margin: float = 0.5
-    """Margin of that check around the hand's box, as a multiple of its longer side."""
-    check_pixels: int = 25_600
-    """Pixels of that check: few, because it is repeated often."""
-    search_s: float = 0.06
-    """Time between searches of the whole image while no hand is tracked."""
-    choose_s: float = 1.0
-    """Least time between searches of the whole image while the tracked hand may be wrong."""
-    misses: int = 2
-    """A tracked hand is dropped after this many checks in a row without a detection."""
-    filled_min: float = 0.25
-    """Least share of a hand's box at the hand's depth."""
-    side_min_m: float = 0.05
-    side_max_m: float = 0.30
-    """Range of the square root of the area of a hand's box, at its depth."""

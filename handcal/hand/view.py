@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from handcal.core.errors import OutOfViewError
 from handcal.core.geometry import camera_matrix
 from handcal.core.types import Bool, Float32, Frame, Intrinsics, UInt16
 
@@ -17,9 +18,6 @@ Box: TypeAlias = tuple[int, int, int, int]
 Pixels: TypeAlias = tuple[NDArray[np.intp], NDArray[np.intp]]
 """Rows and columns."""
 
-
-BEYOND = "the hand is too "
-"""Beginning of the text about a hand beyond the depth gate."""
 _INSIDE_M = 0.05  # from an end of the gate to the middle of a hand that is within it
 
 
@@ -73,8 +71,10 @@ def between(view: DepthView, depth_min_m: float, depth_max_m: float) -> Bool:
     return (view.depth >= round(nearest)) & (view.depth <= round(farthest))
 
 
-def gate_problem(depth_m: NDArray[np.floating], gate_m: tuple[float, float], most: float) -> str:
-    """Return how to move a hand of which more than a share lies beyond the gate; else nothing.
+def gate_problem(
+    depth_m: NDArray[np.floating], gate_m: tuple[float, float], most: float
+) -> OutOfViewError | None:
+    """Return how to move a hand of which more than a share lies beyond the gate; else None.
 
     Parameters
     ----------
@@ -87,14 +87,14 @@ def gate_problem(depth_m: NDArray[np.floating], gate_m: tuple[float, float], mos
     near_m, far_m = gate_m
     near, far = float(np.mean(depth_m < near_m)), float(np.mean(depth_m > far_m))
     if max(near, far) <= most:
-        return ""
+        return None
     low_m, hand_m, high_m = np.quantile(depth_m, [0.02, 0.5, 0.98])
     where = f"at {100 * hand_m:.0f} cm"
     if near >= far:
         back_cm = np.ceil(100 * max(near_m + _INSIDE_M - hand_m, near_m - low_m))
-        return f"{BEYOND}near, {where}; move it back by {back_cm:.0f} cm"
+        return OutOfViewError(f"the hand is too near, {where}", f"move it back by {back_cm:.0f} cm")
     nearer_cm = np.ceil(100 * max(hand_m - far_m + _INSIDE_M, high_m - far_m))
-    return f"{BEYOND}far, {where}; bring it nearer by {nearer_cm:.0f} cm"
+    return OutOfViewError(f"the hand is too far, {where}", f"bring it nearer by {nearer_cm:.0f} cm")
 
 
 def deproject(view: DepthView, rows: NDArray[Any], columns: NDArray[Any]) -> Float32:
@@ -221,3 +221,9 @@ def on_border(mask: Bool) -> Bool:
     inner = np.zeros_like(mask)
     inner[1:-1, 1:-1] = True
     return mask & ~inner
+
+
+def widened(mask: Bool, by_px: int) -> Bool:
+    """Dilate a mask by a square with the given half side."""
+    square = np.ones((2 * by_px + 1, 2 * by_px + 1), np.uint8)
+    return cv2.dilate(mask.view(np.uint8), square).view(bool)

@@ -8,7 +8,7 @@ from scipy.spatial import KDTree
 
 from handcal.core.geometry import invert, transform
 from handcal.core.types import Float64, Intrinsics
-from handcal.hand.outline import moved_inward
+from handcal.hand.outline import inward_normals, moved_contour
 from handcal.sim.hand import HandModel
 from handcal.sim.raster import draw_hand
 from handcal.sim.silhouette import silhouette
@@ -28,6 +28,7 @@ def rim_outline(hand: HandModel, T_eye_hand: Float64, arm_m: float = 0.03) -> Fl
     rim = transform(T_eye_hand, silhouette(hand, invert(T_eye_hand)[:3, 3]).points_m)
     nearest = KDTree(rim[:, :2] / rim[:, 2:]).query(rays)[1]
     outline_m = rim[nearest, 2:] * np.column_stack([rays, np.ones(len(rays))])
-    outline_m = moved_inward(outline_m, FINE, -0.5)
+    outward_px = -0.5 * inward_normals(outer_px)
+    outline_m = moved_contour(outline_m, FINE, outward_px, np.zeros(len(outline_m), bool))
     reach_m = (transform(invert(T_eye_hand), outline_m) - hand.wrist_m) @ hand.arm_axis
     return outline_m[reach_m < arm_m]
