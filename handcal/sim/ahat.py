@@ -1,6 +1,6 @@
 """Measurement by a time-of-flight camera like AHAT, the depth camera for hands of a HoloLens 2.
 
-The camera measures the phase of one modulated light, so distances begin again at `alias_m`. Light
+The camera measures the phase of one modulated light, so distances begin again at `ALIAS_M`. Light
 of two surfaces in one pixel adds as phasors, which makes flying pixels; their noise makes that of
 the distance, larger where little light returns. The lens is rθ = f (θ + k θ³) with f from the like
 sensor of the Azure Kinect, and k so that the ray (1, 1, 1) falls 181.2 px right of and below the
@@ -23,6 +23,11 @@ _MIDDLE_PX = 257.0
 _FOCAL_PX = 252.0
 _CUBIC = 0.0708
 _INVALID = 4090
+ALIAS_M = 1.055
+"""Distance at which the phase wraps, as hl2ss gives it for AHAT."""
+UNITS_PER_M = 1000.0
+# Brightness of a white surface at 1 m, and that below which there is no distance.
+_WHITE_AT_1_M, _LEAST_BRIGHTNESS = 400.0, 40.0
 # Of a hand, and of the room behind it.
 _WALL_M = 1.2
 _SKIN, _WHITE = 0.55, 0.8
@@ -32,18 +37,11 @@ _SKIN, _WHITE = 0.55, 0.8
 class AhatSettings:
     """Settings of the simulated camera; its noise is an assumption, not a device's."""
 
-    alias_m: float = 1.055
-    """As hl2ss gives it for AHAT."""
-    units_per_m: float = 1000.0
-    white: float = 400.0
-    """Brightness of a white surface at 1 m."""
     noise: float = 8.0
     """Standard deviation of each part of a phasor, in units of brightness. A hand at 0.5 m has a
     brightness of 800, so that its distances vary by 1.7 mm."""
     blur_px: float = 0.5
     """Standard deviation of the lens's blur."""
-    least: float = 40.0
-    """Brightness below which there is no distance."""
     offset_m: float = 0.0
     """Fault: added to every distance."""
 
@@ -99,7 +97,7 @@ def sense_distance(
 
     z_m = look(depth_m)
     distance_m = z_m * np.sqrt(1.0 + np.square(rays).sum(axis=2))
-    returned = settings.white * look(shaded) / np.square(np.maximum(distance_m, 0.05))
+    returned = _WHITE_AT_1_M * look(shaded) / np.square(np.maximum(distance_m, 0.05))
     returned[z_m <= 0.0] = 0.0
     return _by_phase(distance_m, returned, rng, settings)
 
@@ -121,18 +119,18 @@ def sense_depth_by_phase(
     Returns
     -------
     (H, W) uint16
-        In units of 1 / `settings.units_per_m`; 0 where there is no measurement.
+        In units of 1 / `UNITS_PER_M`; 0 where there is no measurement.
     """
     x = (np.arange(intrinsics.width, dtype=np.float32) - intrinsics.cx) / intrinsics.fx
     y = (np.arange(intrinsics.height, dtype=np.float32) - intrinsics.cy) / intrinsics.fy
     along = np.sqrt(1.0 + np.square(x) + np.square(y)[:, None]).astype(np.float32)
     reflectance = np.where(depth_m < _WALL_M, _SKIN, _WHITE).astype(np.float32)
     distance_m = depth_m * along
-    returned = settings.white * reflectance * _facing(depth_m, intrinsics) / np.square(distance_m)
+    returned = _WHITE_AT_1_M * reflectance * _facing(depth_m, intrinsics) / np.square(distance_m)
     units, brightness = _by_phase(distance_m, returned, rng, settings)
-    found_m = (units / settings.units_per_m).astype(np.float32)
+    found_m = (units / UNITS_PER_M).astype(np.float32)
     bright = brightness.astype(np.float32)
-    is_near = is_not_wrapped(found_m, bright, settings.alias_m, white_brightness(found_m, bright))
+    is_near = is_not_wrapped(found_m, bright, ALIAS_M, white_brightness(found_m, bright))
     is_near &= units < _INVALID
     return np.where(is_near, np.rint(units / along), 0.0).astype(np.uint16)
 
@@ -144,14 +142,14 @@ def _by_phase(
     settings: AhatSettings,
 ) -> tuple[UInt16, UInt16]:
     """Return distance and brightness of surfaces by the phase of their light, which adds up."""
-    phase = 2.0 * np.pi / settings.alias_m * (distance_m + settings.offset_m)
+    phase = 2.0 * np.pi / ALIAS_M * (distance_m + settings.offset_m)
     parts = np.dstack([returned * np.cos(phase), returned * np.sin(phase)])
     parts = np.asarray(cv2.GaussianBlur(parts, (0, 0), settings.blur_px), np.float64)
     parts += rng.normal(0.0, settings.noise, parts.shape)
     brightness = np.hypot(parts[..., 0], parts[..., 1])
     turns = np.arctan2(parts[..., 1], parts[..., 0]) / (2.0 * np.pi) % 1.0
-    units = np.rint(turns * settings.alias_m * settings.units_per_m)
-    units[brightness < settings.least] = _INVALID
+    units = np.rint(turns * ALIAS_M * UNITS_PER_M)
+    units[brightness < _LEAST_BRIGHTNESS] = _INVALID
     return units.astype(np.uint16), np.clip(np.rint(brightness), 0, 65535).astype(np.uint16)
 
 

@@ -10,10 +10,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from handcal.core.errors import CameraError, CameraTimeoutError
-from handcal.core.geometry import invert, rigid
+from handcal.core.geometry import rigid
 from handcal.core.types import CameraIdentity, Frame, Intrinsics
 from handcal.io.closable import Closable
-from handcal.sim.ahat import AhatSettings, sense_depth_by_phase
+from handcal.sim.ahat import UNITS_PER_M, AhatSettings, sense_depth_by_phase
 from handcal.sim.hand import make_hand
 from handcal.sim.raster import D415
 from handcal.sim.render import World, render
@@ -25,9 +25,6 @@ _POLL_S = 0.002
 # What rendering takes longer is the computer's doing, of which a camera knows nothing: if it
 # counted, a busy computer would be told of a late camera that it does not have.
 _LATENCY_NS = 30_000_000
-# Colour of an Intel RealSense D415 at 1280x720: 69° across, 15 mm beside the depth (data sheet).
-_COLOR = Intrinsics(width=1280, height=720, fx=925.0, fy=925.0, cx=642.0, cy=362.0)
-_T_C_D = rigid([0.002, -0.003, 0.001], [0.015, 0.0, 0.0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,9 +33,6 @@ class SyntheticSettings:
 
     rate_hz: float = 30.0
     """Highest frame rate; lower if rendering takes longer."""
-    aligned: bool = True
-    """Render colour in the depth camera's image, as after the SDK's alignment; otherwise a raw pair
-    from two cameras."""
     clock_offset_s: float = 123.456
     clock_drift: float = 20e-6
     """The camera's clock shows ``(1 + clock_drift) t + clock_offset_s`` at host time t."""
@@ -149,8 +143,8 @@ class SyntheticCamera(Closable):
                 state = self._scene()
             if state is None and now_s >= deadline_s:
                 raise CameraTimeoutError(
-                    f"the simulated camera saw nothing within {timeout_s:g} s: "
-                    "start the virtual headset, which simulates the wearer"
+                    f"the simulated camera saw nothing within {timeout_s:g} s",
+                    "start the virtual headset, which simulates the wearer",
                 )
             if state is None:
                 time.sleep(np.clip(self._next_s - now_s, _POLL_S, deadline_s - now_s + _POLL_S))
@@ -159,19 +153,15 @@ class SyntheticCamera(Closable):
 
     def _expose(self, state: SceneState) -> Frame:
         settings, world = self._settings, self._world
-        color_intrinsics, T_C_D = self.depth_intrinsics, np.eye(4)
         if self._opened_s is None:
             self._opened_s = time.monotonic()
         if self._frozen is not None and time.monotonic() - self._opened_s > settings.freeze_after_s:
             return self._repeat(self._frozen, state)
         depth_m, color = render(world, state.T_W_D, state.T_W_hand, self.depth_intrinsics)
-        if not settings.aligned:
-            color_intrinsics, T_C_D = _COLOR, _T_C_D
-            _, color = render(world, state.T_W_D @ invert(T_C_D), state.T_W_hand, _COLOR)
         biased_m = np.where(depth_m > 0.0, depth_m + settings.depth_bias_m, depth_m)
         sensor = settings.sensor
         if isinstance(sensor, AhatSettings):
-            scale_m = 1.0 / sensor.units_per_m
+            scale_m = 1.0 / UNITS_PER_M
             depth = sense_depth_by_phase(biased_m, self.depth_intrinsics, self._rng, sensor)
         else:
             scale_m = sensor.depth_scale_m
@@ -184,8 +174,7 @@ class SyntheticCamera(Closable):
             depth_scale_m=scale_m,
             depth_intrinsics=self.depth_intrinsics,
             color=color,
-            color_intrinsics=color_intrinsics,
-            T_C_D=T_C_D,
+            color_intrinsics=self.depth_intrinsics,
         )
         self._index += 1
         self._frozen = frame

@@ -171,12 +171,10 @@ class CubeBench(Closable):
 def _move(display: EyeDisplay, shift_m: Float64, points_E_m: Float64, gap_px: Float64) -> Float64:
     """Return the change of φ, (3,), that best moves the drawn points by `gap_px`, (N, 2)."""
     here_px = project(eye_projection(display, shift_m), points_E_m)
-    J = np.column_stack(
-        [
-            (project(eye_projection(display, shift_m + one), points_E_m) - here_px).ravel() / STEP_M
-            for one in STEP_M * np.eye(3)
-        ]
-    )
+    moved_px = [
+        project(eye_projection(display, shift_m + m), points_E_m) for m in STEP_M * np.eye(3)
+    ]
+    J = np.column_stack([(px - here_px).ravel() / STEP_M for px in moved_px])
     return np.asarray(np.linalg.lstsq(J, gap_px.ravel(), rcond=None)[0], np.float64)
 
 

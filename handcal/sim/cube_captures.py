@@ -49,6 +49,12 @@ POSITIONS = {
 }
 """Positions of the camera in the eye box: x right, y down."""
 
+POSITION_M = 0.004
+"""Distance from the centre of the eye box to the other positions."""
+PLACE_SIGMA_M = 0.001
+"""Standard deviation of the camera's position, each axis."""
+_TURN_SIGMA_RAD = 0.02  # of the camera relative to the display, about each axis
+_PICTURES = PictureSettings(samples=2)
 _NEAR_M, _FAR_M, _ASIDE_M = 0.4, 0.6, 0.02
 _EDGE_PX = 8.0
 _MOST_TRIES = 300
@@ -69,15 +75,9 @@ class CaptureSettings:
     """Poses of the cube at each position, 0.4 to 0.6 m away."""
     alignments: int = 1
     """Alignments of the hand at each position."""
-    aside_m: float = 0.004
-    """Distance from the centre of the eye box to the other positions."""
-    place_sigma_m: float = 0.001
-    """Standard deviation of the camera's position, each axis."""
     prior: Literal["camera", "wearer"] = "camera"
     """The solver's prior: the placement of the camera, which is only moved sideways; or the eye
     box of wearers."""
-    turn_sigma_rad: float = 0.02
-    """Standard deviation of the camera's rotation relative to the display, about each axis."""
     points: int = 5000
     """Number of points of the hand's clouds."""
     depth_sigma_m: float = 0.001
@@ -87,7 +87,6 @@ class CaptureSettings:
     cube: Cube = field(default_factory=Cube)
     camera: Intrinsics = VIEWPOINT_CAMERA
     """The eye-replacement camera."""
-    pictures: PictureSettings = field(default_factory=lambda: PictureSettings(samples=2))
 
 
 def write_captures(folder: Path, rig: Rig, settings: CaptureSettings, progress: Progress) -> None:
@@ -117,7 +116,7 @@ def write_captures(folder: Path, rig: Rig, settings: CaptureSettings, progress: 
         If the cube is too large to be seen whole on the display and by the cameras.
     """
     if any(make_folder(folder).iterdir()):
-        raise FileError(f"{folder} is not empty: choose a new folder")
+        raise FileError(f"{folder} is not empty", "choose a new folder")
     with _appearing_in(folder) as rendering:
         _render(rendering, rig, settings, progress)
 
@@ -144,11 +143,11 @@ def _render(folder: Path, rig: Rig, settings: CaptureSettings, progress: Progres
     truth = {}
     for number, position in enumerate(settings.positions):
         rng = np.random.default_rng([settings.seed, number])
-        middle_m = settings.aside_m * np.array([*POSITIONS[position], 0.0])
-        true_m = rng.normal(middle_m, settings.place_sigma_m)
+        middle_m = POSITION_M * np.array([*POSITIONS[position], 0.0])
+        true_m = rng.normal(middle_m, PLACE_SIGMA_M)
         solved_m = studio.calibrate(true_m, rng)
         truth[position] = {"true_shift_m": true_m.tolist(), "solved_shift_m": solved_m.tolist()}
-        T_E_C = rigid(rng.normal(0.0, settings.turn_sigma_rad, 3), true_m)
+        T_E_C = rigid(rng.normal(0.0, _TURN_SIGMA_RAD, 3), true_m)
         shifts_m = {"offline": np.zeros(3), "solved": solved_m, "true": true_m}
         place = make_folder(folder / position)
         write_png(place / "grid.png", studio.capture_display(studio.grid, T_E_C, rng))
@@ -169,9 +168,8 @@ class _Studio:
         self._display = rig.eyes[settings.eye]
         self._T_E_D = view_of_eye(self._display, np.eye(4)) @ rig.T_H_D
         self._hand = make_hand(settings.seed)
-        cube, pictures = settings.cube, settings.pictures
-        self._seen_by_eye = CubePainter(cube, settings.camera, pictures)
-        self._seen_by_depth = CubePainter(cube, rig.depth_intrinsics, pictures)
+        self._seen_by_eye = CubePainter(settings.cube, settings.camera, _PICTURES)
+        self._seen_by_depth = CubePainter(settings.cube, rig.depth_intrinsics, _PICTURES)
         self.grid = draw_grid(Grid(self._display.width_px, self._display.height_px))
 
     def calibrate(self, true_m: Float64, rng: np.random.Generator) -> Float64:
@@ -202,7 +200,7 @@ class _Studio:
             settings.camera,
             rng,
             shift_m=T_E_C[:3, 3],
-            settings=settings.pictures,
+            settings=_PICTURES,
         )
 
     def capture_cube(
@@ -234,7 +232,7 @@ class _Studio:
                 T_D_T = cube_pose(find_cube(image, settings.cube), settings.cube, depth_camera)
                 return T_E_T, self._T_E_D @ T_D_T
         raise CubeError(
-            "part of the cube is off the display or out of a camera's view: use a smaller one"
+            "part of the cube is off the display or out of a camera's view", "use a smaller one"
         )
 
 
@@ -247,8 +245,8 @@ def cube_prior(settings: CaptureSettings) -> PriorSettings:
     """
     if settings.prior == "wearer":
         return PriorSettings()
-    near_m2 = settings.place_sigma_m**2
-    aside_m2 = settings.aside_m**2 + near_m2
+    near_m2 = PLACE_SIGMA_M**2
+    aside_m2 = POSITION_M**2 + near_m2
     covariance_m2 = np.diag([aside_m2, aside_m2, near_m2] * 2)
     return PriorSettings(learned=LearnedPrior((0.0,) * 6, tuple(covariance_m2.ravel().tolist()), 1))
 

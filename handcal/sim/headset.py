@@ -38,6 +38,7 @@ _STEP_AFTER_NS, _STEP_NS = 4_000_000_000, 300_000_000
 _SUSPENDED_S = 2.0
 """Delay of an image from which on the computer has been suspended."""
 _FORMER_SHIFT_M = (0.006, 0.0, 0.0)
+_TRACKING_RAD, _TRACKING_M = 0.0003, 0.0002  # noise of the reported poses
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,9 +64,6 @@ class HeadsetSettings:
     clock_offset_s: float = 12.345
     clock_drift_ppm: float = 30.0
     """Headset's clock minus the host's: initial offset and drift."""
-    tracking_sigma_m: float = 0.0002
-    tracking_sigma_rad: float = 0.0003
-    """Noise of the reported poses."""
     patience_s: float = 10.0
     """Longest time without a connection."""
     duration_s: float | None = None
@@ -136,7 +134,8 @@ def run_headset(
             action = act(state, t_ns / 1e9 - start_s)
             if scene is not None:
                 scene.publish(SceneState(t_ns, action.T_W_H @ worn_rig.T_H_D, action.T_W_hand))
-            client.send_pose(action.T_W_H @ _tracking_error(rng, settings), clock_ns(t_ns))
+            noise = rigid(rng.normal(0.0, _TRACKING_RAD, 3), rng.normal(0.0, _TRACKING_M, 3))
+            client.send_pose(action.T_W_H @ noise, clock_ns(t_ns))
             if action.confirm:
                 client.confirm(clock_ns(t_ns), state)
             if action.nudge is not None and state.verify is not None:
@@ -145,10 +144,12 @@ def run_headset(
             if client.connected or now_s - next_s > _SUSPENDED_S:
                 heard_s = now_s
             elif now_s - heard_s > settings.patience_s:
+                if client.refusal:
+                    raise LinkError(client.refusal)
                 raise LinkError(
-                    client.refusal
-                    or f"no PC answered at {settings.host}:{settings.port} for "
-                    f"{settings.patience_s:g} s; check that it runs with the same pairing key"
+                    f"no PC answered at {settings.host}:{settings.port} for "
+                    f"{settings.patience_s:g} s",
+                    "check that it runs with the same pairing key",
                 )
             next_s = max(next_s + 1.0 / settings.rate_hz, now_s)
             time.sleep(next_s - now_s)
@@ -286,11 +287,4 @@ def _view(state: HeadsetState, rig: Rig, t_s: float) -> DisplayView:
         prompt=state.prompt,
         verify=state.verify if is_ready else None,
         outline_W_m=state.live_W_m if is_outlined else None,
-    )
-
-
-def _tracking_error(rng: np.random.Generator, settings: HeadsetSettings) -> Float64:
-    return rigid(
-        rng.normal(0.0, settings.tracking_sigma_rad, 3),
-        rng.normal(0.0, settings.tracking_sigma_m, 3),
     )

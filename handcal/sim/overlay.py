@@ -105,7 +105,8 @@ def overlay_by_eye(
     if placed is None or len(cursor_m) < _FEWEST_POINTS:
         raise HandcalError(
             "with this rig, a hand raised half a metre from the headset is not on the displays, "
-            "or the depth camera does not see it: check the rig file"
+            "or the depth camera does not see it",
+            "check the rig file",
         )
     eyes_m = [
         transform(invert(view_of_eye(worn.eyes[eye], np.eye(4))), shift_m[None])[0]

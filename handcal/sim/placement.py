@@ -27,18 +27,6 @@ _FEWEST_POINTS = 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CursorMatch:
-    """The points of the hand that a cursor shows."""
-
-    cursor_m: Float64
-    """(N, 3); the cursor, W."""
-    surface_m: Float64
-    """(N, 3); the same points on the hand's surface, in the hand's frame."""
-    T_W_hand: Float64
-    """(4, 4); the hand's pose when the cursor was made."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class CursorView:
     """The view of one open eye."""
 
@@ -60,8 +48,10 @@ class PlacementError:
     """Error of the hand's apparent size."""
 
 
-def match_cursor(hand: HandModel, cursor_m: Float64, T_W_hand: Float64) -> CursorMatch:
-    """Register a cursor to the hand's surface, point to plane, with robust weights.
+def match_cursor(hand: HandModel, cursor_m: Float64, T_W_hand: Float64) -> Float64:
+    """Return the hand's pose (4, 4) when a cursor was made, by the points that the cursor shows.
+
+    Registration to the hand's surface, point to plane, with robust weights.
 
     Parameters
     ----------
@@ -81,9 +71,7 @@ def match_cursor(hand: HandModel, cursor_m: Float64, T_W_hand: Float64) -> Curso
         JW = J.T * weights
         step = -np.linalg.solve(JW @ J + 1e-9 * np.eye(6), JW @ distance_m)
         T_hand_W = rigid(step[:3], step[3:]) @ T_hand_W
-    points = transform(T_hand_W, cursor_m)
-    distance_m, normals = _to_surface(hand, tree, points)
-    return CursorMatch(cursor_m, points - distance_m[:, None] * normals, invert(T_hand_W))
+    return invert(T_hand_W)
 
 
 def _to_surface(hand: HandModel, tree: KDTree, points: Float64) -> tuple[Float64, Float64]:

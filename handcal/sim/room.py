@@ -12,16 +12,9 @@ import numpy as np
 from handcal.core.frozen import freeze
 from handcal.core.types import Float32, Float64, Intrinsics, UInt8
 
-
-@dataclass(frozen=True, slots=True)
-class RoomSettings:
-    """Distributions from which a room is drawn."""
-
-    nearest_wall_m: float = 1.2
-    farthest_wall_m: float = 2.4
-    """Range of the distances from W's origin to each wall, the floor and the ceiling."""
-    texel_m: float = 0.004
-    """Size of a texture's pixel."""
+# Range of the distances from W's origin to each wall, the floor and the ceiling.
+_WALLS_M = 1.2, 2.4
+_TEXEL_M = 0.004  # size of a texture's pixel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,7 +27,6 @@ class Room:
     textures: tuple[UInt8, ...]
     """each (h, w, 3); RGB of the walls −x, +x, −y, +y, −z, +z; rows run along the later of the two
     axes that span the wall, columns along the earlier."""
-    texel_m: float
     light: Float64
     """(3,); unit vector toward the light, W."""
 
@@ -45,18 +37,17 @@ class Room:
 
 
 @lru_cache(maxsize=2)  # as hands are
-def make_room(seed: int, settings: RoomSettings | None = None) -> Room:
+def make_room(seed: int) -> Room:
     """Return the room of a seed: distances and textures of its walls, and the light's direction."""
-    settings = settings or RoomSettings()
     rng = np.random.default_rng(seed)
-    low_m = -rng.uniform(settings.nearest_wall_m, settings.farthest_wall_m, 3)
-    high_m = rng.uniform(settings.nearest_wall_m, settings.farthest_wall_m, 3)
+    low_m = -rng.uniform(*_WALLS_M, 3)
+    high_m = rng.uniform(*_WALLS_M, 3)
     textures = []
     for axis in range(3):
-        width, height = np.ceil(np.delete(high_m - low_m, axis) / settings.texel_m).astype(int)
+        width, height = np.ceil(np.delete(high_m - low_m, axis) / _TEXEL_M).astype(int)
         textures += [_wallpaper(rng, int(width), int(height)) for _ in range(2)]
     light = np.array([rng.uniform(-0.6, 0.6), -1.0, rng.uniform(-0.9, -0.3)])
-    return Room(low_m, high_m, tuple(textures), settings.texel_m, light / np.linalg.norm(light))
+    return Room(low_m, high_m, tuple(textures), light / np.linalg.norm(light))
 
 
 def _wallpaper(rng: np.random.Generator, width: int, height: int) -> UInt8:
@@ -146,6 +137,6 @@ def _walls(room: Room, T_W_D: Float64) -> Iterator[tuple[Float64, UInt8, Float64
             for row, other in enumerate(across):
                 H[row] = (
                     away_m * R[other] + (center[other] - room.low_m[other]) * R[axis]
-                ) / room.texel_m - 0.5 * R[axis]
+                ) / _TEXEL_M - 0.5 * R[axis]
             H[2] = R[axis]
             yield R[axis] / away_m, room.textures[2 * axis + side], H

@@ -24,20 +24,6 @@ edges are where those of the hand are."""
 class SensorSettings:
     """Settings of the depth sensor."""
 
-    baseline_m: float = 0.055
-    """Distance between the imagers; D415: 55 mm (data sheet)."""
-    disparity_sigma_px: float = 0.08
-    """Subpixel error of the matching."""
-    correlation_px: float = 2.0
-    """Standard deviation of the Gaussian that correlates the errors of neighbours, which share
-    matching windows."""
-    disparity_step_px: float = 1.0 / 32.0
-    """Resolution of the matching; D4xx: 1/32 px."""
-    edge_px: int = 3
-    """Width of the band along a depth edge where the matching window sees both sides."""
-    edge_hole_ratio: float = 0.35
-    edge_flying_ratio: float = 0.15
-    """Shares of the pixels in that band without depth, and with a depth in between."""
     fatten_px: float = 0.0
     """Width by which near surfaces grow over what is behind them, half of the matching window; on a
     D4xx 1 to 3 px. Of a fraction, as large a share of the edges grows by one more."""
@@ -51,10 +37,18 @@ class SensorSettings:
     """Metres per unit."""
 
 
+_BASELINE_M = 0.055  # between the imagers of a D415 (data sheet)
+_DISPARITY_SIGMA_PX = 0.08  # subpixel error of the matching
+# Standard deviation of the Gaussian that correlates the errors of neighbours, which share matching
+# windows.
+_CORRELATION_PX = 2.0
+_DISPARITY_STEP_PX = 1.0 / 32.0  # resolution of a D4xx's matching
+# Width of the band along a depth edge where the matching window sees both sides, and the shares of
+# the pixels in it without depth, and with a depth in between. A disparity difference above the last
+# one is an edge, not a slope.
+_EDGE_PX, _EDGE_HOLES, _EDGE_FLYING, _EDGE_STEP_PX = 3, 0.35, 0.15, 4.0
 # Size of the patches in which an edge grows by one pixel more.
 _PATCH_PX = 6.0
-# A disparity difference above this within the band is an edge, not a slope.
-_EDGE_STEP_PX = 4.0
 
 
 D415_FATTEN_PX = 2.35
@@ -110,18 +104,17 @@ def sense_depth(
     (H, W) uint16
         In units of `settings.depth_scale_m`; 0 where there is no measurement.
     """
-    fB = focal_px * settings.baseline_m
+    fB = focal_px * _BASELINE_M
     disparity = np.float32(fB) / depth_m
     hidden = _not_tried(disparity, settings)
     if settings.fatten_px:
         disparity = _fattened(disparity, settings.fatten_px, rng)
     hidden |= _hidden_from_the_right(disparity)
-    hidden |= _blur_edges(disparity, rng, settings)
-    disparity += settings.disparity_sigma_px * _correlated_noise(
-        disparity.shape, settings.correlation_px, rng
-    )
-    np.rint(disparity / settings.disparity_step_px, out=disparity)
-    units = fB / settings.disparity_step_px / settings.depth_scale_m
+    hidden |= _blur_edges(disparity, rng)
+    noise_px = _correlated_noise(disparity.shape, _CORRELATION_PX, rng)
+    disparity += _DISPARITY_SIGMA_PX * noise_px
+    np.rint(disparity / _DISPARITY_STEP_PX, out=disparity)
+    units = fB / _DISPARITY_STEP_PX / settings.depth_scale_m
     # OpenCV rounds, saturates, and gives 0 for a disparity of 0.
     measured = np.asarray(cv2.divide(units, disparity, dtype=cv2.CV_16U), dtype=np.uint16)
     measured[hidden] = 0
@@ -161,15 +154,15 @@ def _hidden_from_the_right(disparity: Float32) -> Bool:
     return right_px > leftmost
 
 
-def _blur_edges(disparity: Float32, rng: np.random.Generator, settings: SensorSettings) -> Bool:
+def _blur_edges(disparity: Float32, rng: np.random.Generator) -> Bool:
     """Spread flying pixels along depth edges, in place, and return where the edges are holes."""
-    window = np.ones((settings.edge_px, settings.edge_px), dtype=np.uint8)
+    window = np.ones((_EDGE_PX, _EDGE_PX), dtype=np.uint8)
     far, near = cv2.erode(disparity, window), cv2.dilate(disparity, window)
     edge = np.flatnonzero(near - far > _EDGE_STEP_PX)
     fate = rng.random(len(edge))
     holes = np.zeros(disparity.shape, dtype=np.bool_)
-    holes.flat[edge[fate < settings.edge_hole_ratio]] = True
-    flying = edge[fate > 1.0 - settings.edge_flying_ratio]
+    holes.flat[edge[fate < _EDGE_HOLES]] = True
+    flying = edge[fate > 1.0 - _EDGE_FLYING]
     share = rng.random(len(flying), dtype=np.float32)
     disparity.flat[flying] = far.flat[flying] + share * (near.flat[flying] - far.flat[flying])
     return holes

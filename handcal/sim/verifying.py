@@ -8,7 +8,7 @@ movement and growth that would make them coincide.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from handcal.sim.silhouette import find_gaps, view_outline
 _LOOKS = 3
 # Half a step either way is as good; a little more does not make the wearer press again.
 _CONTENT_STEPS = 0.75
+_LOOK_S, _PRESS_S = 0.6, 0.12  # times of a look, and of one press of a key
 # The longest that a wearer waits for the effect of a key.
 _EFFECT_S = 3.0
 # The drawing trembles with the delay of camera and link; a person sees its middle.
@@ -97,17 +98,11 @@ class SimulatedVerification:
     request : VerifyRequest
     error : SeenDifference
         Error with which this wearer sees the difference, the same at every look.
-    look_s, press_s : float
-        Times of a look, and of one press of a key.
     """
 
-    def __init__(
-        self, request: VerifyRequest, error: SeenDifference, look_s: float, press_s: float
-    ) -> None:
+    def __init__(self, request: VerifyRequest, error: SeenDifference) -> None:
         self.request = request
         self._error = error
-        self._look_s = look_s
-        self._press_s = press_s
         self._next_s = 0.0
         self._sample_s = 0.0
         self._looks = 0
@@ -134,11 +129,11 @@ class SimulatedVerification:
                 return None, False
             self._moved = self._moved.plus(*self._presses.pop())
             # After the last key, wait for the drawing.
-            self._next_s = t_s + (self._press_s if self._presses else _EFFECT_S)
+            self._next_s = t_s + (_PRESS_S if self._presses else _EFFECT_S)
             return self._moved, False
         if not np.array_equal(drawn, self._drawn):
             self._drawn = drawn
-            self._next_s = t_s + self._look_s
+            self._next_s = t_s + _LOOK_S
             self._samples.clear()
         if t_s >= self._sample_s:
             self._sample_s = t_s + _SAMPLE_S
@@ -147,7 +142,7 @@ class SimulatedVerification:
         if t_s < self._next_s or len(self._samples) < _FEWEST_SAMPLES:
             return None, False
         self._decide()
-        self._next_s = t_s + self._look_s
+        self._next_s = t_s + _LOOK_S
         self._samples.clear()
         return (None, False) if self._presses else (self._moved, True)
 
@@ -156,7 +151,7 @@ class SimulatedVerification:
         self._looks += 1
         if self._looks > _MOST_LOOKS:
             return
-        mean = np.mean([[one.right_arcmin, one.down_arcmin, one.size] for one in self._samples], 0)
+        mean = np.mean([astuple(sample) for sample in self._samples], axis=0)
         presses = presses_for(SeenDifference(*mean.tolist()), self._error, self.request)
         steps = self.request.step_arcmin, self.request.step_arcmin, self.request.step_size
         for axis, (whole, step) in enumerate(zip(presses, steps, strict=True)):
@@ -176,7 +171,7 @@ def presses_for(
         seen.size + error.size,
     )
     right, down, size = (
-        step * round(one / step) if abs(one) > _CONTENT_STEPS * step else 0.0
-        for one, step in zip(wanted, steps, strict=True)
+        step * round(move / step) if abs(move) > _CONTENT_STEPS * step else 0.0
+        for move, step in zip(wanted, steps, strict=True)
     )
     return right, down, size

@@ -29,6 +29,12 @@ _LOWERED_M = 0.35
 _AT_ONCE_S = 1e-3
 _FAR_M = 0.05
 _ARCMIN = np.radians(1.0 / 60.0)
+_EYE_SIGMA_M = 0.0005  # each eye's own deviation along each axis
+_NOVICE_RAD = 0.23  # rotation of a novice's first overlay
+# Error with which an outline is seen to cover the hand: right and down (arcmin) and relative in
+# size; one for each verification.
+_SEEING_SIGMAS = np.array([2.0, 2.0, 0.005])
+_LOOK_AROUND_RAD, _LOOK_AROUND_S = 0.06, 2.0  # amplitude and period of the head's movement
 _KEEP = "Keep your hand"
 """In prompts that ask the wearer not to lower the hand."""
 
@@ -133,7 +139,7 @@ def draw_eyes(rng: np.random.Generator, settings: WearerSettings) -> dict[Eye, F
     apart_m = rng.normal(0.0, settings.eye_distance_sigma_m)
     shifts: dict[Eye, Float64] = {}
     for eye, side in zip(EYES, (-0.5, 0.5), strict=True):
-        own_m = rng.normal(0.0, settings.eye_sigma_m, 3)
+        own_m = rng.normal(0.0, _EYE_SIGMA_M, 3)
         shift_m = common_m + own_m + [side * apart_m, 0.0, 0.0]
         shorten = settings.largest_shift_m / max(
             settings.largest_shift_m, float(np.linalg.norm(shift_m))
@@ -212,12 +218,11 @@ class Wearer:
 
     def _look_around(self, view: DisplayView) -> Float64:
         """Turn the head from side to side while asked to; begin and end slowly."""
-        settings = self._settings
-        most = (view.t_s - self._stepped_s) / (0.25 * settings.look_period_s)
+        most = (view.t_s - self._stepped_s) / (0.25 * _LOOK_AROUND_S)
         self._stepped_s = view.t_s
         self._looks += float(np.clip((view.prompt == LOOK_AROUND) - self._looks, -most, most))
-        phase = 2.0 * np.pi * view.t_s / settings.look_period_s
-        return rigid([0.0, self._looks * settings.look_rad * np.sin(phase), 0.0])
+        phase = 2.0 * np.pi * view.t_s / _LOOK_AROUND_S
+        return rigid([0.0, self._looks * _LOOK_AROUND_RAD * np.sin(phase), 0.0])
 
     def _notice(self, view: DisplayView, move: _Move) -> None:
         """Start aligning with a new cursor, and relax after the alignment."""
@@ -242,16 +247,8 @@ class Wearer:
     def _verify(self, view: DisplayView, request: VerifyRequest) -> None:
         """Hold the hand where it is, and look at the outline."""
         if self._verification is None or self._verification.request != request:
-            settings = self._settings
-            right, down, size = self._rng.normal(size=3) * [
-                settings.nudge_sigma_arcmin,
-                settings.nudge_sigma_arcmin,
-                settings.nudge_size_sigma,
-            ]
-            error = SeenDifference(right, down, size)
-            self._verification = SimulatedVerification(
-                request, error, settings.look_s, settings.press_s
-            )
+            right, down, size = (self._rng.normal(size=3) * _SEEING_SIGMAS).tolist()
+            self._verification = SimulatedVerification(request, SeenDifference(right, down, size))
         if self._phase in ("reaching", "awaiting"):
             self._stay(view.t_s)
         self._phase = "verifying"
@@ -287,10 +284,10 @@ class Wearer:
             every = -(-len(view.cursor_W_m) // _CURSOR_POINTS)
             cursor_m = np.asarray(view.cursor_W_m[::every], dtype=np.float64)
             # How the drawn hand is turned, people see at a glance.
-            match = match_cursor(self._hand, cursor_m, self._recognised(cursor_m))
-            self._T_W_cursor = self._overlaid = match.T_W_hand
+            recognised = self._recognised(cursor_m)
+            self._T_W_cursor = self._overlaid = match_cursor(self._hand, cursor_m, recognised)
         self._task = task
-        turned_rad = self._settings.novice_rotation_rad if self._is_naive else 0.0
+        turned_rad = _NOVICE_RAD if self._is_naive else 0.0
         self._reach(view.t_s, self._draw_error(turned_rad))
 
     def _recognised(self, cursor_m: Float64) -> Float64:

@@ -13,8 +13,6 @@ class WearerSettings:
     """Placement of the headset, common to both eyes, E axes: lateral, vertical, eye relief."""
     eye_distance_sigma_m: float = 0.002
     """Deviation of the eye distance from the rig's."""
-    eye_sigma_m: float = 0.0005
-    """Each eye's own deviation along each axis."""
     largest_shift_m: float = 0.010
     """Eye box, to which longer shifts are shortened."""
     slip_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -39,8 +37,6 @@ class WearerSettings:
     """Rotation of the hand relative to the cursor, about a random axis."""
     novice: bool | None = None
     """A novice first overlays and confirms a rotated hand; None to choose by the seed."""
-    novice_rotation_rad: float = 0.23
-    """Rotation of a novice's first overlay."""
     head_sway_m: float = 0.003
     head_sway_rad: float = 0.005
     hand_sway_m: float = 0.0005
@@ -48,13 +44,3 @@ class WearerSettings:
     """Amplitudes of slow sway."""
     tremor_m: float = 0.0001
     """Amplitude of the hand's tremor, 8 to 12 Hz."""
-    nudge_sigma_arcmin: float = 2.0
-    nudge_size_sigma: float = 0.005
-    """Error with which an outline is seen to cover the hand, in each of two directions and
-    relative in size; one for each verification."""
-    look_s: float = 0.6
-    press_s: float = 0.12
-    """Times of a look at the outline, and of one press of a key."""
-    look_rad: float = 0.06
-    look_period_s: float = 2.0
-    """Amplitude and period of the head's movement when asked to look around."""

@@ -14,7 +14,7 @@ from handcal.core.types import Bool, Float32, Float64, Frame, Intrinsics, Rig, U
 from handcal.hand.outline import edges_of, with_outline
 from handcal.hand.segment import segment_hand
 from handcal.hand.settings import SegmentSettings
-from handcal.sim.ahat import AhatSettings, ahat_rays, sense_distance
+from handcal.sim.ahat import ALIAS_M, UNITS_PER_M, AhatSettings, ahat_rays, sense_distance
 from handcal.sim.hand import HandModel
 from handcal.sim.raster import D415, draw_hand
 from handcal.sim.sensor import SensorName, SensorSettings, sense_depth
@@ -74,10 +74,10 @@ def _ahat() -> See:
     def sense(depth_m: Float32, rng: np.random.Generator) -> UInt16:
         reflectance = np.where(depth_m < _WALL_M, _SKIN, _WHITE).astype(np.float32)
         distance, brightness = sense_distance(depth_m, reflectance, _WIDE, rng, settings)
-        distance_m = (distance / settings.units_per_m).astype(np.float32)
+        distance_m = (distance / UNITS_PER_M).astype(np.float32)
         bright = brightness.astype(np.float32)
         white = white_brightness(distance_m, bright)
-        is_near = is_not_wrapped(distance_m, bright, settings.alias_m, white)
+        is_near = is_not_wrapped(distance_m, bright, ALIAS_M, white)
         return view.depth(np.where(is_near, distance_m, np.float32(0.0)))
 
     def see(rng: np.random.Generator, hand: HandModel, rig: Rig, T_H_hand: Float64) -> SeenHand:
