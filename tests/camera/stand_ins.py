@@ -1,9 +1,11 @@
-"""Stand-ins for the libraries of Orbbec and OAK-D cameras, with the calls that handcal makes."""
+"""Stand-ins: a camera with a script, and the libraries of Orbbec and OAK-D cameras."""
 
 from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Sequence
+from dataclasses import replace
 from datetime import timedelta
 from itertools import count
 from types import ModuleType, SimpleNamespace
@@ -11,7 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from handcal.core.errors import CameraError, CameraTimeoutError
 from handcal.core.geometry import rigid
+from handcal.core.types import CameraIdentity, Frame, Intrinsics
+from handcal.io.closable import Closable
 
 T_C_D = rigid([0.01, -0.02, 0.03], [0.015, 0.001, -0.002])
 PERIOD_US = 33_000
@@ -210,3 +215,35 @@ class _OakPipeline:
 
     def stop(self) -> None:
         pass
+
+
+PALE = "a frame without colour"
+SILENT = CameraTimeoutError("no frame came")
+UNPLUGGED = CameraError("the camera was unplugged", "plug it in again")
+
+
+class Scripted(Closable):
+    """Gives what its script says: a frame for a number, and silence at the end."""
+
+    name = "Scripted camera"
+    identity = CameraIdentity()
+    depth_intrinsics = Intrinsics(16, 12, 20.0, 20.0, 7.5, 5.5)
+
+    def __init__(self, script: Sequence[int | str | Exception]) -> None:
+        self.script = list(script)
+        self.number = 0
+        self.is_closed = False
+
+    def read(self, timeout_s: float = 1.0) -> Frame:
+        step = self.script.pop(0) if self.script else SILENT
+        if isinstance(step, Exception):
+            time.sleep(min(timeout_s, 0.05) if isinstance(step, CameraTimeoutError) else 0.0)
+            raise step
+        self.number = number = step if isinstance(step, int) else self.number + 1
+        color, depth = np.full((12, 16, 3), number, np.uint8), np.full((12, 16), number, np.uint16)
+        lens = self.depth_intrinsics
+        frame = Frame(number, number * 100_000_000, 0, depth, 1e-3, lens, color, lens)
+        return frame if step != PALE else replace(frame, color=None, color_intrinsics=None)
+
+    def close(self) -> None:
+        self.is_closed = True

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from handcal.camera.camera import Camera
-from handcal.camera.feed import CameraFeed
 from handcal.camera.hololens2 import HoloLens2Camera, HoloLens2RealSense
 from handcal.camera.live import open_hololens2
 from handcal.camera.oak import OakCamera
@@ -27,7 +26,7 @@ from handcal.sim.ahat import ahat_rays
 from handcal.sim.camera import SyntheticCamera
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World
-from handcal.sim.room import RoomSettings, make_room
+from handcal.sim.room import make_room
 from handcal.sim.scene import swaying_hand
 from tests.camera.hl2ss_server import (
     GROUPS,
@@ -42,7 +41,6 @@ from tests.camera.hl2ss_server import (
 )
 from tests.camera.rosbag import write_rosbag
 from tests.camera.stand_ins import OakStandIn, OrbbecStandIn
-from tests.helpers import eventually
 
 COUNT = 6
 KINDS = (
@@ -55,7 +53,7 @@ OpenCamera: TypeAlias = Callable[[], Camera]
 
 @pytest.fixture(scope="module")
 def world() -> World:
-    return World(make_hand(1), make_room(0, RoomSettings(texel_m=0.02)))
+    return World(make_hand(1), make_room(0))
 
 
 @pytest.fixture(params=KINDS)
@@ -176,29 +174,3 @@ def test_a_camera_tells_which_device_it_is(open_camera: OpenCamera) -> None:
         others[f"{NAME} on the HoloLens 2 at 127.0.0.1"] = CameraIdentity("Intel RealSense D415")
         others["HoloLens 2 AHAT at 127.0.0.1"] = CameraIdentity("HoloLens 2 AHAT")
         assert camera.identity == others.get(camera.name, D415)
-
-
-@pytest.mark.parametrize("name", ["made", "made.db3"])
-def test_a_recording_of_an_unknown_camera_names_none(
-    name: str, make_frames: Callable[..., Iterator[Frame]], tmp_path: Path
-) -> None:
-    record_frames(tmp_path / name, make_frames(1))
-    with open_recording(tmp_path / name) as camera:
-        assert camera.identity == CameraIdentity()
-
-
-@pytest.mark.parametrize("name", ["0925_012.bag", "0925_015.bag"])
-def test_a_recording_by_a_real_camera_names_it(shared_data: Path, name: str) -> None:
-    pytest.importorskip("pyrealsense2")
-    with open_recording(shared_data / "recordings" / name) as camera:
-        assert camera.identity == CameraIdentity(
-            "Intel RealSense D435", "817512071792", "05.11.06.250"
-        )
-
-
-def test_a_feed_tells_which_device_it_reads(open_camera: OpenCamera) -> None:
-    with CameraFeed(open_camera) as feed:
-        assert feed.status.identity == CameraIdentity()
-        eventually(feed.read)
-        # A ROS 2 recording does not know its device.
-        assert feed.status.identity.model or feed.status.name == "Recording bag"

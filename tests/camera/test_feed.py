@@ -6,37 +6,19 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from handcal.camera.feed import CameraFeed, FeedSettings
-from handcal.core.errors import CameraEndError, CameraError, CameraTimeoutError
-from handcal.core.types import CameraIdentity, Float32, Frame, Intrinsics
-from handcal.io.closable import Closable
+from handcal.camera.feed import CameraFeed
+from handcal.core.errors import CameraEndError, CameraError
+from handcal.core.types import Float32, Frame
+from tests.camera.stand_ins import SILENT, UNPLUGGED, Scripted
 
-CAMERA = Intrinsics(8, 6, 10.0, 10.0, 3.5, 2.5)
-SETTINGS = FeedSettings(read_s=0.01, silent_s=0.03, reopen_s=0.05)
-UNPLUGGED = CameraError("the camera was unplugged; plug it in again")
-SILENT = CameraTimeoutError("nothing came")
+REOPEN_S = 0.05
 
 
-class Scripted(Closable):
-    """Gives what its script says, a frame for a number."""
-
-    name = "Scripted camera"
-    identity = CameraIdentity()
-    depth_intrinsics = CAMERA
-
-    def __init__(self, script: Sequence[int | Exception]) -> None:
-        self.script = list(script)
-        self.is_closed = False
-
-    def read(self, timeout_s: float = 1.0) -> Frame:
-        step = self.script.pop(0) if self.script else SILENT
-        if isinstance(step, Exception):
-            time.sleep(timeout_s if isinstance(step, CameraTimeoutError) else 0.0)
-            raise step
-        return Frame(step, step, step, np.zeros((6, 8), np.uint16), 1e-3, CAMERA)
-
-    def close(self) -> None:
-        self.is_closed = True
+@pytest.fixture(autouse=True)
+def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("handcal.camera.feed._READ_S", 0.01)
+    monkeypatch.setattr("handcal.camera.feed._SILENT_S", 0.03)
+    monkeypatch.setattr("handcal.camera.feed._REOPEN_S", REOPEN_S)
 
 
 def opener(*scripts: Sequence[int | Exception]) -> tuple[Callable[[], Scripted], list[Scripted]]:
@@ -62,7 +44,7 @@ def read_frame(feed: CameraFeed, timeout_s: float = 5.0) -> Frame:
 
 def test_frames_come_and_gaps_in_their_count_are_dropped_frames() -> None:
     open_camera, opened = opener([1, 2, 5, 6])
-    with CameraFeed(open_camera, SETTINGS) as feed:
+    with CameraFeed(open_camera) as feed:
         frames = [feed.read() for _ in range(4)]
         status = feed.status
     assert [frame.index for frame in frames if frame is not None] == [1, 2, 5, 6]
@@ -73,7 +55,7 @@ def test_frames_come_and_gaps_in_their_count_are_dropped_frames() -> None:
 
 def test_a_camera_unplugged_and_plugged_in_again_goes_on() -> None:
     open_camera, opened = opener([7, UNPLUGGED], [1])
-    with CameraFeed(open_camera, SETTINGS) as feed:
+    with CameraFeed(open_camera) as feed:
         assert feed.read() is not None
         assert feed.read() is None
         assert feed.status.problem == str(UNPLUGGED)
@@ -91,18 +73,18 @@ def test_it_says_why_no_camera_can_be_opened_and_keeps_trying() -> None:
         attempts.append(time.monotonic())
         return open_camera()
 
-    with CameraFeed(attempt, SETTINGS) as feed:
+    with CameraFeed(attempt) as feed:
         started_s = time.monotonic()
         while len(attempts) < 3:
             assert feed.read() is None
             assert feed.status.problem == "no camera is connected; plug one in"
             assert time.monotonic() - started_s < 5.0
-    assert np.diff(attempts).min() > 0.9 * SETTINGS.reopen_s
+    assert np.diff(attempts).min() > 0.9 * REOPEN_S
 
 
 def test_only_a_camera_silent_for_a_while_has_a_problem() -> None:
     open_camera, _ = opener([1, SILENT, SILENT, SILENT, SILENT, SILENT, 2])
-    with CameraFeed(open_camera, SETTINGS) as feed:
+    with CameraFeed(open_camera) as feed:
         assert feed.read() is not None
         problems = []
         for _ in range(5):
@@ -116,7 +98,7 @@ def test_only_a_camera_silent_for_a_while_has_a_problem() -> None:
 
 def test_a_recording_that_has_ended_is_named_and_stays_so() -> None:
     open_camera, opened = opener([0, CameraEndError("the recording has ended")], [1])
-    with CameraFeed(open_camera, SETTINGS) as feed:
+    with CameraFeed(open_camera) as feed:
         assert feed.read() is not None
         for _ in range(8):
             assert feed.read() is None
@@ -126,7 +108,7 @@ def test_a_recording_that_has_ended_is_named_and_stays_so() -> None:
 
 def test_a_recording_without_a_frame_is_named_and_not_opened_all_the_time() -> None:
     open_camera, opened = opener(*[[CameraEndError("the recording has ended")]] * 3)
-    with CameraFeed(open_camera, SETTINGS) as feed:
+    with CameraFeed(open_camera) as feed:
         assert [feed.read() for _ in range(3)] == [None, None, None]
         assert feed.status.problem == "the recording has ended without a frame"
     assert len(opened) == 1
@@ -141,7 +123,7 @@ def test_a_camera_that_can_expose_for_the_hand_receives_its_region() -> None:
 
     hand = np.zeros((1, 3), np.float32)
     for camera in (Exposing([1]), Scripted([1])):
-        feed = CameraFeed(lambda camera=camera: camera, SETTINGS)  # type: ignore[misc]
+        feed = CameraFeed(lambda camera=camera: camera)  # type: ignore[misc]
         feed.expose_for(hand)  # not open yet
         read_frame(feed)
         feed.expose_for(hand)

@@ -1,4 +1,4 @@
-"""A HoloLens 2 as depth camera, before a stand-in for its server."""
+"""A HoloLens 2 as depth camera, and a RealSense on its USB port, before stand-ins."""
 
 from __future__ import annotations
 
@@ -9,33 +9,46 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeAlias
 
-import cv2
 import numpy as np
 import pytest
 
-from handcal.camera.feed import CameraFeed, FeedSettings
-from handcal.camera.folder import FolderCamera, record_folder
-from handcal.camera.hl2ss import STREAMS, parse_calibration, parse_packet
-from handcal.camera.hololens2 import HoloLens2Camera, hololens2_settings
+from handcal.camera.feed import CameraFeed
+from handcal.camera.hololens2 import (
+    DepthFormat,
+    HoloLens2Camera,
+    HoloLens2RealSense,
+    find_depth,
+    hololens2_settings,
+)
+from handcal.camera.live import is_live, open_hololens2
 from handcal.camera.radial import is_not_wrapped, white_brightness
 from handcal.camera.settings import HoloLens2Settings
 from handcal.core.errors import CameraError, CameraTimeoutError
 from handcal.core.geometry import rigid
-from handcal.core.types import Float32, Float64, Frame, Intrinsics, UInt16
-from handcal.io.images import PNG_START
+from handcal.core.types import CameraIdentity, Float32, Float64, Frame, Intrinsics, UInt16
 from handcal.sim.ahat import AhatSettings, ahat_rays, sense_distance
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from tests.camera.hl2ss_server import (
     AHAT_REQUEST,
+    FORMATS,
+    GROUPS,
+    LENS,
     LONG_THROW_REQUEST,
+    NAME,
     Hl2ssServer,
     ahat_payload,
+    as_sent,
     calibration_of,
+    camera_list_of,
     color_payload,
+    depth_packet_of,
+    group,
     long_throw_payload,
+    one_format,
     packet_of,
+    realsense_settings,
 )
 from tests.helpers import eventually
 
@@ -110,16 +123,6 @@ def test_depth_is_that_of_a_pinhole_camera(
     assert frame.color[seen].mean() > 3.0 * frame.color[~is_hand].mean()
 
 
-def test_a_recording_plays_with_the_poses(serve: Serve, tmp_path: Path) -> None:
-    with HoloLens2Camera(serve()) as camera:
-        frames = [camera.read(5.0), camera.read(5.0)]
-    record_folder(tmp_path / "taken", frames, camera.identity)
-    with FolderCamera(tmp_path / "taken") as played:
-        for frame in frames:
-            assert frame.T_W_D is not None
-            np.testing.assert_array_equal(played.read().T_W_D, frame.T_W_D)
-
-
 def test_a_small_hand_tells_a_large_far_wall_apart() -> None:
     """Most of what seems near is the wall: not it, but the brightest is taken for skin."""
     distance_m = np.full((512, 512), 1.6 - 1.055, np.float32)
@@ -133,25 +136,6 @@ def test_a_small_hand_tells_a_large_far_wall_apart() -> None:
     assert is_near[200:250, 200:250].all()
     assert np.count_nonzero(is_near) == 50 * 50 + 25
     assert white_brightness(np.zeros_like(distance_m), brightness) == 0.0
-
-
-def test_a_mirror_is_forgotten(
-    serve: Serve, held_up: tuple[World, UInt16, UInt16], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("handcal.camera.hololens2._FADING", 0.3)  # within a few images
-    _, distance, brightness = held_up
-    mirror = brightness.copy()
-    mirror[:60, :60] = 30_000
-    near = np.where(mirror == 30_000, 500, distance).astype(np.uint16)
-    is_there = True
-    hand, dazzled = (
-        packet_of(5, ahat_payload(*images), T_W_H)
-        for images in ((distance, brightness), (near, mirror))
-    )
-    with HoloLens2Camera(serve(lambda: dazzled if is_there else hand)) as camera:
-        assert not camera.read(5.0).depth[200:300, 220:290].any()
-        is_there = False
-        eventually(lambda: camera.read(5.0).depth[200:300, 220:290].any(), 20.0)
 
 
 def test_a_plane_is_flat_up_to_the_sides(serve: Serve) -> None:
@@ -242,21 +226,6 @@ def test_a_foreign_picture_is_one_clear_error(serve: Serve, picture: bytes, mess
         eventually(fails)
 
 
-def test_without_the_front_camera_there_is_one_clear_error(serve: Serve) -> None:
-    with Hl2ssServer(b"", lambda: None) as gone:
-        port = gone.port
-    with pytest.raises(CameraError, match="no hl2ss answers"):
-        HoloLens2Camera(replace(serve(), has_color=True, color_port=port))
-
-
-def test_invalid_distances_are_no_measurement(serve: Serve) -> None:
-    distance = FLAT.copy()
-    distance[:, 300:] = 4091
-    frame = view(serve(packet_of(5, ahat_payload(distance, FLAT), T_W_H)))
-    assert frame.depth[:, :290].all()
-    assert not frame.depth[:, 330:].any()  # the lens draws the sides together
-
-
 def test_a_lost_headset_gives_no_frame_until_it_knows_its_place(serve: Serve) -> None:
     lost = packet_of(5, ahat_payload(FLAT, FLAT), None)
     is_lost = True
@@ -307,16 +276,6 @@ def test_a_damaged_png_is_one_clear_error(serve: Serve, payload: bytes) -> None:
         view(settings)
 
 
-def test_opencv_does_not_see_a_png_that_announces_more_than_it_holds(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    size = struct.pack(">II", 320, 288)
-    lying = PNG_START + size + b"\x08\x06\0\0\0" + bytes(4) + b"\xff\xff\xff\xf0IDAT" + bytes(64)
-    monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("it was decoded"))
-    with pytest.raises(CameraError, match="no PNG of"):
-        parse_packet(STREAMS["longthrow"], packet_of(5, lying, T_W_H))
-
-
 @pytest.mark.parametrize(
     "calibration",
     [
@@ -337,27 +296,22 @@ def test_a_damaged_calibration_is_one_clear_error(serve: Serve, calibration: byt
         HoloLens2Camera(serve(calibration=calibration))
 
 
-def test_rays_that_are_none_at_the_corners_are_left_out() -> None:
-    rays = ahat_rays().copy()
-    rays[:90, :90] = np.inf
-    calibration = parse_calibration(STREAMS["ahat"], calibration_of(rays, T_H_D))
-    assert calibration.alias_m == pytest.approx(1.055)
-    assert np.isinf(calibration.rays[0, 0, 0])
-
-
-def test_nobody_there_is_one_clear_error() -> None:
+def test_nobody_there_is_one_clear_error(serve: Serve) -> None:
     with Hl2ssServer(b"", lambda: None) as server:
         port = server.port
     with pytest.raises(CameraError, match=r"no hl2ss answers at 127\.0\.0\.1"):
         HoloLens2Camera(HoloLens2Settings("127.0.0.1", port=port))
+    with pytest.raises(CameraError, match="no hl2ss answers"):  # the front camera
+        HoloLens2Camera(replace(serve(), has_color=True, color_port=port))
     with pytest.raises(CameraError, match="say which HoloLens 2"):
         HoloLens2Camera(HoloLens2Settings())
 
 
-def test_a_stream_that_ends_is_opened_again(serve: Serve) -> None:
+def test_a_stream_that_ends_is_opened_again(serve: Serve, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("handcal.camera.feed._REOPEN_S", 0.01)
     left = [PACKET, None, PACKET, PACKET[:5000], None]
     settings = serve(lambda: left.pop(0) if left else PACKET)
-    with CameraFeed(lambda: HoloLens2Camera(settings), FeedSettings(reopen_s=0.01)) as feed:
+    with CameraFeed(lambda: HoloLens2Camera(settings)) as feed:
         eventually(feed.read)
         eventually(lambda: feed.read() is None and "ended the stream" in feed.status.problem)
         eventually(lambda: feed.read() and not left)
@@ -376,3 +330,111 @@ def test_a_stream_that_ends_is_opened_again(serve: Serve) -> None:
 )
 def test_a_source_names_the_headset(source: str, expected: HoloLens2Settings | None) -> None:
     assert hololens2_settings(source) == expected
+
+
+START = b"\x07" + 7 * b"\0" + struct.pack("<3f2I", 1.0, 0.0, 0.0, 0, 0)
+# Option 2**64 - 5 is the image format, 2**64 - 4 the mask for widths.
+REQUEST = b"\0\x02\0\x02" + struct.pack("<4Q", 2**64 - 5, 2, 2**64 - 4, 0)
+
+
+@pytest.fixture
+def serve_depth(tmp_path: Path) -> Iterator[Serve]:
+    """Return a function that serves a packet, again and again, and a list of cameras."""
+    with ExitStack() as stack:
+
+        def serve(packet: bytes, groups: object = GROUPS) -> HoloLens2Settings:
+            server = stack.enter_context(Hl2ssServer(camera_list_of(groups), lambda: packet))
+            serve.server = server  # type: ignore[attr-defined]
+            return realsense_settings(server, tmp_path)
+
+        yield serve
+
+
+@pytest.mark.parametrize("padding", [0, 16])
+def test_depth_comes_as_measured_with_the_lens_of_the_rig(serve_depth: Serve, padding: int) -> None:
+    depth = np.arange(32 * 48, dtype=np.uint16).reshape(32, 48)
+    settings = serve_depth(
+        depth_packet_of(7, np.pad(depth, ((0, 0), (0, padding)), constant_values=9))
+    )
+    with open_hololens2(settings) as camera:
+        frame = camera.read(5.0)
+    np.testing.assert_array_equal(frame.depth, depth)
+    assert (frame.depth_intrinsics, frame.depth_scale_m) == (LENS, 0.001)
+    assert (frame.t_camera_ns, frame.color, frame.T_W_D) == (700, None, None)
+    assert camera.identity == CameraIdentity("Intel RealSense D415")
+    assert camera.name == f"{NAME} on the HoloLens 2 at 127.0.0.1"
+    server = serve_depth.server  # type: ignore[attr-defined]
+    eventually(lambda: len(server.requests) == 4)
+    assert server.requests == [b"\x02", START, REQUEST, b"\x0b"]
+
+
+@pytest.mark.parametrize(
+    ("packet", "problem"),
+    [
+        (depth_packet_of(1, np.zeros((32, 48)), (64, 32)), "an image of 64x32 pixels"),
+        (depth_packet_of(1, np.zeros(32 * 48 + 1)), "an image of 48x32 pixels in"),
+        (depth_packet_of(1, np.zeros((32, 24))), "a payload of 1540 bytes"),
+        (struct.pack("<QI", 1, 2**31), "a payload of 2147483648 bytes"),
+        (depth_packet_of(2**62, np.zeros((32, 48))), "a time beyond"),
+    ],
+)
+def test_what_is_no_depth_image_is_refused(serve_depth: Serve, packet: bytes, problem: str) -> None:
+    with (
+        HoloLens2RealSense(serve_depth(packet)) as camera,
+        pytest.raises(CameraError, match=f"not the RealSense depth stream.* {problem}"),
+    ):
+        camera.read(5.0)
+
+
+def test_the_format_is_the_slowest_from_15_hz_on() -> None:
+    assert find_depth(as_sent(GROUPS), LENS) == DepthFormat(NAME, 1, 2, 2)
+    quick = {"7": group(f"{NAME} ", one_format(90.0), one_format(60.0), one_format(14.9))}
+    assert find_depth(as_sent(quick), LENS) == DepthFormat(NAME, 7, 1, 4)
+
+
+@pytest.mark.parametrize(
+    ("groups", "problem"),
+    [
+        ({}, "found: none"),
+        ({"0": GROUPS["0"]}, "found: QC Back Camera"),
+        ({"0": group("\ud800 a\n\x1b[1mcamera" + 200 * "!")}, r"found: \? a \[1mcamera!{86}\)"),
+        ({"0": group(NAME, one_format(6.0))}, "has no depth images of 48x32 at 15 Hz"),
+        ({"0": group(NAME.replace("415", "405"), *FORMATS)}, "a unit that hl2ss does not report"),
+        ([], "sent no list of cameras"),
+        ({"0": []}, "sent no list of cameras"),
+        ({"1e9": GROUPS["1"]}, "sent no list of cameras"),
+        ({str(2**200): GROUPS["1"]}, "sent no list of cameras"),
+        ({"0": group(NAME, {"Width": 48})}, "sent no list of cameras"),
+        ({"0": group(NAME, one_format("fast"))}, "sent no list of cameras"),  # type: ignore[arg-type]
+    ],
+)
+def test_a_missing_depth_camera_is_an_error_with_its_reason(groups: object, problem: str) -> None:
+    with pytest.raises(CameraError, match=problem):
+        find_depth(as_sent(groups), LENS)
+
+
+def test_bytes_that_are_no_list_are_refused() -> None:
+    for data in (b"", b"\0", b"\xff\xd8", ("[" * 100_000).encode("utf-16-le")):
+        with pytest.raises(CameraError, match="sent no list of cameras"):
+            find_depth(data, LENS)
+
+
+def test_a_huge_list_is_not_received(serve_depth: Serve) -> None:
+    settings = serve_depth(b"")
+    with (
+        Hl2ssServer(struct.pack("<I", 2**31), lambda: None) as server,
+        pytest.raises(CameraError, match="a list of cameras of 2,147,483,648 bytes"),
+    ):
+        open_hololens2(replace(settings, color_port=server.port))
+
+
+def test_its_name_tells_host_and_rig_file(tmp_path: Path) -> None:
+    settings = hololens2_settings("hololens2:h,realsense=C:/a,b=c.yaml")
+    assert settings == HoloLens2Settings("h", realsense_rig="C:/a,b=c.yaml")
+    assert is_live("hololens2:h,realsense=rig.yaml")
+    nameless = hololens2_settings("hololens2:h,realsense")
+    assert nameless is not None
+    with pytest.raises(CameraError, match="name the rig file"):
+        open_hololens2(nameless)
+    with pytest.raises(CameraError, match=r"absent\.yaml"):
+        open_hololens2(HoloLens2Settings("h", realsense_rig=str(tmp_path / "absent.yaml")))

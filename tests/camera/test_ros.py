@@ -94,15 +94,6 @@ def test_compressed_images_and_ros_1_are_played_alike(
         assert camera.notes == ()
 
 
-@pytest.mark.parametrize("name", ["raw_depth_compressed_colour", "compressed_depth_and_colour"])
-def test_compressed_topics_of_others_are_played_with_colour(shared_data: Path, name: str) -> None:
-    with open_recording(shared_data / "field" / "ros" / name) as camera:
-        for _ in range(3):
-            assert camera.read().color is not None
-        with pytest.raises(CameraEndError):
-            camera.read()
-
-
 def test_compressed_metres_are_a_over_value_minus_b(tmp_path: Path) -> None:
     metres = np.array([[np.nan, 0.4, 0.5, 0.6], [0.7, 0.8, 1, 2], [0.3, 0.5, 0.5, 3]], "<f4")
     message = compressed(image(2, "depth", "32FC1", metres), 2_000.0, 9.0)
@@ -155,27 +146,12 @@ def test_a_bag_of_librealsense_is_not_one_of_ros_1(tmp_path: Path, shared_data: 
         assert ros_recording(path) is None
 
 
-def test_damaged_compressed_images_are_one_error(tmp_path: Path) -> None:
-    message = compressed(image(2, "depth", "16UC1", GRAY))
-    for data in (b"", bytes(message.data[:40]), bytes(message.data[12:])):
-        message.data = np.frombuffer(data, np.uint8)
-        folder = tmp_path / str(len(data))
-        folder.mkdir()
-        with pytest.raises(CameraError, match="an image of the recording"):
-            play(folder, [INFO, (f"{DEPTH}/compressedDepth", 2, message)])
-
-
 def test_metres_become_tenths_of_a_millimetre(tmp_path: Path) -> None:
     metres = np.array([[0.0, np.nan, np.inf, -1.0], [0.5, 6.5, 6.6, 0.00004], [1, 2, 3, 4]], "<f4")
     frame = play(tmp_path, [INFO, (DEPTH, 2, image(2, "depth", "32FC1", metres))])
     assert frame.depth_scale_m == 1e-4
     wanted = [[0, 0, 0, 0], [5000, 65000, 0, 0], [10000, 20000, 30000, 40000]]
     assert frame.depth.tolist() == wanted
-
-
-def test_rows_may_be_padded_and_big_endian(tmp_path: Path) -> None:
-    padded = image(2, "depth", "16UC1", GRAY.astype(">u2"), pad_bytes=6)
-    assert np.array_equal(play(tmp_path, [INFO, (DEPTH, 2, padded)]).depth, GRAY)
 
 
 def test_blue_first_colours_are_turned_and_the_nearest_in_time_taken(tmp_path: Path) -> None:
@@ -194,17 +170,6 @@ def test_blue_first_colours_are_turned_and_the_nearest_in_time_taken(tmp_path: P
     assert frame.color is not None
     assert frame.color[0, 0].tolist() == [30, 0, 10]
     np.testing.assert_allclose(frame.T_C_D, np.linalg.inv(T_D_C), atol=1e-12)
-
-
-def test_depth_aligned_to_colour_is_the_second_choice(tmp_path: Path) -> None:
-    aligned = "/camera/aligned_depth_to_color"
-    messages = [
-        INFO,
-        (f"{aligned}/camera_info", 1, info(CAMERA, "color")),
-        (f"{aligned}/image_raw", 1, image(1, "color", "16UC1", GRAY + 7)),
-        (DEPTH, 2, image(2, "depth", "16UC1", GRAY)),
-    ]
-    assert np.array_equal(play(tmp_path, messages).depth, GRAY)
 
 
 @pytest.mark.parametrize(
@@ -241,22 +206,6 @@ def test_colour_without_a_transform_is_refused(tmp_path: Path, make_frames: Make
     messages = [one for one in frame_messages(make_frames(2)) if one[0] != "/tf_static"]
     with pytest.raises(CameraError, match="no transform between 'depth' and 'color'"):
         play(tmp_path, messages)
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e300])
-@pytest.mark.parametrize("field", ["translation.x", "translation.z", "rotation.w", "rotation.y"])
-def test_an_impossible_transform_is_refused(
-    tmp_path: Path, make_frames: MakeFrames, value: float, field: str
-) -> None:
-    messages = list(frame_messages(make_frames(2)))
-    part, axis = field.split(".")
-    for topic, _, message in messages:
-        if topic == "/tf_static":
-            moved = message.transforms[-1].transform
-            setattr(getattr(moved, part), axis, value)
-    with pytest.raises(CameraError) as caught:
-        play(tmp_path, messages)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("is_mcap", [True, False])

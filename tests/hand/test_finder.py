@@ -120,6 +120,9 @@ def test_another_thing_is_never_taken_for_the_hand_that_the_detector_sees(frame:
     elsewhere = Eyes((20, 20, 160, 180))
     with pytest.raises(HandError, match="only the background"):
         HandFinder(SETTINGS, elsewhere).find(frame)
+    x0, y0, _, _ = segment_hand(frame, SETTINGS).box_px
+    with pytest.raises(HandError, match="the detector and the depth image disagree"):
+        HandFinder(SETTINGS, Eyes((x0, y0, x0 + 40, y0 + 90))).find(frame)  # one finger
     blind = Eyes((0, 0, 0, 0))
     with pytest.raises(HandError, match=r"no hand is seen|only the background|measures nothing"):
         HandFinder(SETTINGS, blind).find(frame)

@@ -1,17 +1,12 @@
-import json
-from pathlib import Path
-
-import cv2
 import numpy as np
 import pytest
 
 from handcal.core.errors import FileError, HandError
 from handcal.core.types import Frame, Intrinsics, UInt8
 from handcal.hand import shipped as detector
-from handcal.hand.detect import Detections, HandDetector, overlaps
+from handcal.hand.detect import Detections, HandDetector
 from handcal.hand.settings import Roi, SegmentSettings
 from handcal.hand.shipped import load_detector, make_finder
-from handcal.io.images import read_image
 
 
 @pytest.mark.parametrize(
@@ -36,16 +31,6 @@ def hands() -> HandDetector:
 def test_both_models_ship_and_nothing_is_seen_in_nothing(hands: HandDetector) -> None:
     gray: UInt8 = np.full((720, 1280, 3), 127, np.uint8)
     assert len(hands.detect(gray).scores) == 0
-
-
-def test_real_hands_are_found(hands: HandDetector, shared_data: Path) -> None:
-    folder = shared_data / "rgbd" / "color_aligned_640"
-    shots = json.loads((folder / "meta.json").read_text())
-    for name, shot in shots.items():
-        found = hands.detect(
-            read_image(folder / f"{name}_color.jpg", cv2.IMREAD_COLOR_RGB)
-        ).boxes_px
-        assert overlaps(found, np.array([shot["hand_box"]])).max() >= 0.5
 
 
 class Eyes:

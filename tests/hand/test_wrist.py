@@ -117,13 +117,6 @@ def test_the_slanted_end_of_an_arm_that_leaves_the_view_is_not_its_wrist() -> No
     assert cut_m == pytest.approx(whole_m, abs=0.015)
 
 
-def test_seen_from_its_edge_a_limb_says_less_by_its_width() -> None:
-    width_m = (0.05 + 0.3 * np.abs(PLACE_M - 0.07)).clip(0, 0.085).astype(np.float32)
-    _, front_m = find(width_m, 0.042)
-    _, edge_m = find(width_m, 0.018)
-    assert edge_m > 2.0 * front_m
-
-
 @pytest.mark.parametrize("exit_m", [0.12, 0.14])
 def test_seen_from_its_edge_the_wrist_is_up_to_four_centimetres_before_the_box_ends(
     exit_m: float,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from handcal.core.types import Float32, Float64, Intrinsics
-from handcal.sim.ahat import AhatSettings, sense_depth_by_phase
+from handcal.sim.ahat import UNITS_PER_M, AhatSettings, sense_depth_by_phase
 
 CAMERA = Intrinsics(320, 288, 250.0, 250.0, 159.5, 143.5)
 SETTINGS = AhatSettings()
@@ -27,7 +27,7 @@ def sense_m(depth_m: Float32, settings: AhatSettings = SETTINGS, seed: int = 0) 
     units = sense_depth_by_phase(depth_m, CAMERA, np.random.default_rng(seed), settings)
     assert units.dtype == np.uint16
     assert units.shape == depth_m.shape
-    return np.asarray(units / settings.units_per_m, np.float64)
+    return np.asarray(units / UNITS_PER_M, np.float64)
 
 
 def test_a_hand_is_measured_with_noise_of_millimetres() -> None:
@@ -54,12 +54,6 @@ def test_what_is_beyond_one_turn_of_the_phase_has_no_depth(wall_m: float) -> Non
     assert (measured_m[110:180, 120:200] > 0.0).all()
 
 
-def test_a_wall_within_the_first_turn_is_measured_beside_the_hand() -> None:
-    beside_m = sense_m(scene(0.9))[100:190, 60:100]
-    assert (beside_m > 0.0).mean() > 0.9
-    assert np.median(beside_m[beside_m > 0.0]) == pytest.approx(0.9, abs=3e-3)
-
-
 def test_pixels_that_see_both_hand_and_wall_have_a_phase_in_between() -> None:
     sharp, blurred = (
         sense_m(scene(0.9), replace(SETTINGS, blur_px=px, noise=1e-3)) for px in (0.05, 1.0)
@@ -71,13 +65,3 @@ def test_pixels_that_see_both_hand_and_wall_have_a_phase_in_between() -> None:
     ]
     assert between[0] == 0
     assert between[1] >= 50  # at least one pixel of each row
-
-
-def test_a_constant_error_of_distance_stays() -> None:
-    wrong_m = sense_m(scene(), replace(SETTINGS, offset_m=0.01))[130:160, 145:175]
-    assert wrong_m.mean() == pytest.approx(HAND_M + 0.01, abs=5e-4)
-
-
-def test_seed_decides_and_repeats() -> None:
-    np.testing.assert_array_equal(sense_m(scene(), seed=1), sense_m(scene(), seed=1))
-    assert (sense_m(scene(), seed=1) != sense_m(scene(), seed=2)).any()

@@ -53,34 +53,6 @@ def test_the_cursor_is_turned_by_the_angle_about_a_point_of_its_own(hand: HandMo
     assert still.min() < 1e-9
 
 
-def test_clean_clouds_hold_the_same_points_in_another_order(hand: HandModel) -> None:
-    made = _make(hand, 0.2, CLEAN)
-    assert len(made.cursor_m) == len(made.hand_m) == 800
-    cursor_E = transform(made.T_E_W, made.cursor_m)
-    known = {tuple(point) for point in made.known_cursor_m.round(9)}
-    assert {tuple(point) for point in cursor_E.round(9)} == known
-    assert not np.allclose(cursor_E, made.known_cursor_m)
-
-
-def test_clouds_are_in_the_world_and_pairs_in_e(hand: HandModel) -> None:
-    made = _make(hand, 0.0, CLEAN)
-    np.testing.assert_allclose(
-        transform(made.T_E_W, made.hand_m).mean(axis=0),
-        made.known_hand_m.mean(axis=0),
-        atol=1e-9,
-    )
-
-
-def test_noise_lies_along_the_rays(hand: HandModel) -> None:
-    quiet = _make(hand, 0.0, replace(CLEAN, count=3000))
-    noisy = _make(hand, 0.0, replace(CLEAN, count=3000, depth_sigma_m=0.002))
-    before, after = (transform(made.T_E_W, made.hand_m) for made in (quiet, noisy))
-    np.testing.assert_allclose(
-        after[:, :2] / after[:, 2:], before[:, :2] / before[:, 2:], atol=1e-12
-    )
-    assert np.std(after[:, 2] - before[:, 2]) == pytest.approx(0.002, rel=0.1)
-
-
 def test_forearms_are_cut_where_told(hand: HandModel) -> None:
     settings = replace(CLEAN, resample=True, cursor_forearm_m=0.02, hand_forearm_m=0.06, count=3000)
     made = _make(hand, 0.0, settings)
@@ -89,17 +61,3 @@ def test_forearms_are_cut_where_told(hand: HandModel) -> None:
     assert 0.7 < len(made.known_hand_m) / len(made.hand_m) < 0.97
     equal = _make(hand, 0.0, replace(settings, hand_forearm_m=0.02))
     assert len(equal.known_hand_m) == len(equal.hand_m)
-
-
-def test_the_shift_is_within_bounds_and_the_seed_decides(hand: HandModel) -> None:
-    shifts_m = np.array(
-        [
-            simulate_alignment(
-                np.random.default_rng(seed), hand, 0.0, replace(CLEAN, count=150, shift_max_m=0.004)
-            ).shift_m
-            for seed in range(10)
-        ]
-    )
-    assert 0.002 < np.abs(shifts_m).max() <= 0.004
-    one, again = (_make(hand, 0.1, CLEAN) for _ in range(2))
-    np.testing.assert_array_equal(one.cursor_m, again.cursor_m)

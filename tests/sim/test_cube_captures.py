@@ -23,6 +23,8 @@ from handcal.rig.displays.grid import Grid
 from handcal.rig.example import example_rig
 from handcal.rig.formats import read_intrinsics
 from handcal.sim.cube_captures import (
+    PLACE_SIGMA_M,
+    POSITION_M,
     POSITIONS,
     CaptureSettings,
     cube_prior,
@@ -103,11 +105,10 @@ def test_the_prior_along_the_line_of_sight_is_the_cameras_stand() -> None:
     def sigmas_m(settings: CaptureSettings) -> Float64:
         return np.sqrt(np.diag(eye_prior(cube_prior(settings)).covariance_m2)[:3])
 
-    settings = CaptureSettings(aside_m=0.003, place_sigma_m=0.0004)
-    aside_m = np.hypot(0.003, 0.0004)
-    assert sigmas_m(settings) == pytest.approx([aside_m, aside_m, 0.0004])
+    aside_m = np.hypot(POSITION_M, PLACE_SIGMA_M)
+    assert sigmas_m(SETTINGS) == pytest.approx([aside_m, aside_m, PLACE_SIGMA_M])
     wearer_m = np.sqrt(np.diag(eye_prior().covariance_m2)[:3])
-    assert sigmas_m(replace(settings, prior="wearer")) == pytest.approx(wearer_m)
+    assert sigmas_m(replace(SETTINGS, prior="wearer")) == pytest.approx(wearer_m)
 
 
 @pytest.mark.campaign
@@ -119,7 +120,7 @@ def test_the_cube_gains_across_the_line_of_sight_and_loses_nothing_along_it() ->
     for seed, (number, place) in product(range(1, 21), enumerate(POSITIONS.values())):
         rng = np.random.default_rng([seed, number])
         hand = make_hand(seed)
-        true_m = rng.normal(settings.aside_m * np.array([*place, 0.0]), settings.place_sigma_m)
+        true_m = rng.normal(POSITION_M * np.array([*place, 0.0]), PLACE_SIGMA_M)
         alignments = [
             overlay_by_eye(
                 rng,

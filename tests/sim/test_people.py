@@ -11,7 +11,6 @@ from handcal.sim.people import (
     begin_sitting,
     draw_error,
     draw_movement_m,
-    draw_perception,
     is_balanced,
 )
 from handcal.sim.wearer_settings import WearerSettings
@@ -39,16 +38,6 @@ def test_plain_people_err_as_the_settings_say() -> None:
     np.testing.assert_allclose(sigma, expected, rtol=0.12)
 
 
-def test_errors_by_distance_are_the_same_on_the_hand() -> None:
-    near, far = (_errors("by-distance", depth_m)[0].std(axis=0) for depth_m in (0.42, 0.56))
-    np.testing.assert_allclose(near * 0.42, far * 0.56, rtol=1e-9)
-
-
-def test_heavy_tails_are_heavier_than_a_gaussians() -> None:
-    x = _errors("heavy-tails")[0][:, 0]
-    assert np.mean(x**4) / np.mean(x**2) ** 2 > 4.0  # 3 for a Gaussian
-
-
 def test_a_drifting_persons_error_is_partly_the_same_for_a_sitting() -> None:
     errors = _errors("drift", sittings=60)
     between, within = errors.mean(axis=1).std(axis=0), errors.std(axis=1).mean(axis=0)
@@ -66,21 +55,6 @@ def test_only_the_named_part_of_the_hand_is_balanced() -> None:
     assert along_m[fingers].max() < along_m[palm].min()
     assert (fingers | palm).all()
     assert all_of_it.all()
-
-
-def test_perception_scales_with_the_person() -> None:
-    rng = np.random.default_rng(2)
-    drawn = [
-        np.std(
-            [
-                draw_perception(rng, sitting, 1.5, 0.004).right_arcmin
-                for sitting in [begin_sitting(rng, USUAL, "plain", scale)]
-                for _ in range(400)
-            ]
-        )
-        for scale in (1.0, 4.0)
-    ]
-    np.testing.assert_allclose(drawn, [1.5, 6.0], rtol=0.12)
 
 
 def test_only_some_hands_move_before_they_are_measured() -> None:

@@ -71,28 +71,6 @@ def test_one_eye_moved_forward_moves_the_hand_by_the_exact_factor(
     assert moved_m == pytest.approx(phi_3_m * (1 - depth_m / 2.0), rel=0.05)
 
 
-def test_both_eyes_shifted_alike_agree_on_the_hand(surface_m: Float64) -> None:
-    views = _views(surface_m, (0.003, -0.002, 0.005), EYES)
-    placed = overlay_hand(surface_m, T_W_HAND, views)
-    assert placed is not None
-    offsets_px = np.concatenate(
-        [_seen_px(view, transform(placed[0], surface_m)) - view.drawn_px for view in views]
-    )
-    np.testing.assert_allclose(np.nanmean(offsets_px, axis=0), 0.0, atol=0.05)
-    assert placed[1] == pytest.approx(np.sqrt(np.nanmean((offsets_px**2).sum(1))), rel=1e-6)
-    assert placed[1] < 2.0  # a translated hand is not quite what a shifted eye sees
-
-
-def _seen_px(view: CursorView, points_m: Float64) -> Float64:
-    homogeneous = np.column_stack([points_m, np.ones(len(points_m))]) @ view.seen.T
-    return homogeneous[:, :2] / homogeneous[:, 2:]
-
-
-def test_points_beside_the_display_are_not_seen(surface_m: Float64) -> None:
-    far_aside_m = surface_m + np.array([0.5, 0.0, 0.0])
-    assert overlay_hand(surface_m, T_W_HAND, _views(far_aside_m, (0, 0, 0), EYES)) is None
-
-
 def test_noisy_cursor_with_flying_pixels_finds_the_hand(
     hand: HandModel, surface_m: Float64
 ) -> None:
@@ -100,12 +78,9 @@ def test_noisy_cursor_with_flying_pixels_finds_the_hand(
     cursor_m = transform(T_W_HAND, surface_m) + rng.normal(0.0, 0.0005, surface_m.shape)
     cursor_m[::25, 2] += 0.05
     guess = T_W_HAND @ rigid([0.01, 0.01, -0.01], [0.002, 0.001, -0.002])
-    match = match_cursor(hand, cursor_m, guess)
-    error = invert(T_W_HAND) @ match.T_W_hand
+    error = invert(T_W_HAND) @ match_cursor(hand, cursor_m, guess)
     assert np.linalg.norm(error[:3, 3]) < 0.0004
     assert Rotation.from_matrix(error[:3, :3]).magnitude() < 0.006
-    regular = np.arange(len(surface_m)) % 25 != 0
-    assert np.median(np.linalg.norm(match.surface_m - surface_m, axis=1)[regular]) < 0.001
 
 
 def test_a_placement_error_turns_the_line_of_sight_and_scales_it() -> None:

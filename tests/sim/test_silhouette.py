@@ -15,7 +15,6 @@ from handcal.sim.raster import draw_hand
 from handcal.sim.silhouette import (
     OutlineView,
     find_gaps,
-    outline_normals,
     overlay_outline,
     silhouette,
     view_outline,
@@ -99,33 +98,20 @@ def test_an_exact_outline_leaves_no_gap_and_asks_for_nothing(
     assert abs(found.size) < 1e-3
 
 
-@pytest.mark.parametrize("moved", [(4.0, 0.0), (-4.0, 0.0), (0.0, 4.0), (0.0, -4.0)])
-def test_a_moved_outline_is_found_as_such(
-    hand: HandModel, rim_m: Float64, moved: tuple[float, float]
+@pytest.mark.parametrize(
+    "change",
+    [(4.0, 0.0, 0.0), (-4.0, 0.0, 0.0), (0.0, 4.0, 0.0), (-12.0, 9.0, 0.0), (0.0, 0.0, 0.01)],
+)
+def test_a_moved_or_grown_outline_is_found_as_such(
+    hand: HandModel, rim_m: Float64, change: tuple[float, float, float]
 ) -> None:
     """The movement back would make it fit."""
-    found = seen(hand, altered(rim_m, *moved))
+    found = seen(hand, altered(rim_m, *change))
     assert found is not None
-    np.testing.assert_allclose((found.right_arcmin, found.down_arcmin), -np.array(moved), atol=0.4)
-    assert abs(found.size) < 1e-3
-
-
-@pytest.mark.parametrize("size", [0.01, -0.01])
-def test_a_grown_outline_is_found_as_such(hand: HandModel, rim_m: Float64, size: float) -> None:
-    found = seen(hand, altered(rim_m, size=size))
-    assert found is not None
-    assert found.size == pytest.approx(-size, abs=1e-3)
-    assert abs(found.right_arcmin) < 0.4
+    assert found.right_arcmin == pytest.approx(-change[0], abs=0.6)
     # The middle of the line is not that of what is compared, so that growth moves a little.
-    assert abs(found.down_arcmin) < 1.5
-
-
-def test_an_outline_that_is_far_away_is_found_by_looking_again(
-    hand: HandModel, rim_m: Float64
-) -> None:
-    found = seen(hand, altered(rim_m, -12.0, 9.0))
-    assert found is not None
-    np.testing.assert_allclose((found.right_arcmin, found.down_arcmin), (12.0, -9.0), atol=0.6)
+    assert found.down_arcmin == pytest.approx(-change[1], abs=1.5 if change[2] else 0.6)
+    assert found.size == pytest.approx(-change[2], abs=1e-3)
 
 
 @pytest.mark.parametrize("away_m", [(0.006, -0.004, 0.012), (-0.006, 0.004, -0.03)])
@@ -232,46 +218,3 @@ def test_an_inner_rim_of_the_hand_is_no_silhouette(hand: HandModel) -> None:
     sight = eye_m - rim.points_m
     sight /= np.linalg.norm(sight, axis=1)[:, None]
     assert np.abs(np.einsum("ij,ij->i", rim.normals, sight)).max() < 0.1
-
-
-def test_normals_point_outward_whichever_way_the_outline_runs() -> None:
-    angle = np.linspace(0.0, 2.0 * np.pi, 100, endpoint=False)
-    circle = np.column_stack([np.cos(angle), np.sin(angle)])
-    for outline, outward in ((circle, circle), (circle[::-1], circle[::-1])):
-        np.testing.assert_allclose(outline_normals(50.0 * outline + 300.0), outward, atol=1e-3)
-
-
-def test_given_normals_need_no_order(hand: HandModel, rim_m: Float64) -> None:
-    ordered = view(rim_m)
-    points_W_m = to_W("left", rim_m)
-    mixed = np.random.default_rng(0).permutation(len(points_W_m))
-    T_E_W = view_of_eye(RIG.eyes["left"], T_W_H)
-    outward_px = outline_normals(rim_m[:, :2] / rim_m[:, 2:])
-    outward_W = np.pad(outward_px, ((0, 0), (0, 1))) @ T_E_W[:3, :3]
-    unordered = view_outline(
-        RIG.eyes["left"],
-        TRUE_M,
-        T_W_H,
-        drawn_with("left", TRUE_M),
-        points_W_m[mixed],
-        outward_W[mixed],
-    )
-    one, other = (find_gaps(hand, pose_W("left"), v) for v in (ordered, unordered))
-    assert one is not None
-    assert other is not None
-    assert np.median(other.gap_px) == pytest.approx(np.median(one.gap_px), abs=0.05)
-    assert len(other.gap_px) > 0.9 * len(one.gap_px)
-
-
-def test_a_view_is_of_the_true_eye_and_not_of_the_drawn_one(
-    hand: HandModel, rim_m: Float64
-) -> None:
-    """A drawing for an eye 1 mm farther right is too far left: the hand is before the display."""
-    display, drawn = RIG.eyes["left"], drawn_with("left", TRUE_M + np.array([0.001, 0.0, 0.0]))
-    outline_W_m = to_W("left", rim_m)
-    found = see_difference(display, TRUE_M, drawn, T_W_H, hand, pose_W("left"), outline_W_m)
-    assert found is not None
-    depth_m = float(np.mean(rim_m[:, 2] + TRUE_M[2]))
-    expected_arcmin = 60.0 * np.degrees(0.001 * (1.0 / depth_m - 1.0 / display.z_C0_S_m))
-    assert found.right_arcmin == pytest.approx(expected_arcmin, abs=0.4)
-    assert abs(found.down_arcmin) < 0.4

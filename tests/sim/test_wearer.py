@@ -160,39 +160,6 @@ def test_after_new_projections_the_hand_is_raised_elsewhere(hand: HandModel) -> 
     np.testing.assert_allclose(stage.action.T_W_hand[:3, 3], T_a[:3, 3], atol=0.0004)
 
 
-def test_one_eye_after_the_other_with_one_cursor(hand: HandModel) -> None:
-    stage = Stage(hand, STEADY)
-    stage.wait(3.0)
-    stage.show_cursor(1, ("left",))
-    assert len(stage.wait(3.0)) == 1
-    left = stage.action.T_W_hand
-    stage.view = replace(stage.view, eyes=("right",))
-    assert len(stage.wait(3.0)) == 1
-    apart_m = np.subtract(*(stage.wearer.true_shift_m[eye] for eye in EYES))
-    moved_m = np.linalg.norm((stage.action.T_W_hand - left)[:3, 3])
-    assert moved_m == pytest.approx(np.linalg.norm(apart_m) * 0.73, rel=0.3)
-
-
-def test_cursor_that_is_not_on_the_displays_is_never_confirmed(hand: HandModel) -> None:
-    stage = Stage(hand, STEADY)
-    stage.wait(3.0)
-    stage.show_cursor(1)
-    assert stage.view.cursor_W_m is not None
-    beside_m = stage.view.cursor_W_m + np.array([1.0, 0.0, 0.0])
-    stage.view = replace(stage.view, cursor_W_m=beside_m)
-    assert stage.wait(4.0) == []
-
-
-def test_seed_decides_and_repeats(hand: HandModel) -> None:
-    one, again, other = (Stage(hand, WearerSettings(), seed) for seed in (3, 3, 4))
-    for stage in (one, again, other):
-        stage.wait(2.0)
-        stage.show_cursor(1)
-        stage.wait(2.0)
-    np.testing.assert_array_equal(one.action.T_W_hand, again.action.T_W_hand)
-    assert not np.allclose(one.action.T_W_hand, other.action.T_W_hand)
-
-
 def test_drawn_eyes_have_the_asked_spread_and_stay_in_the_eye_box() -> None:
     rng = np.random.default_rng(0)
     drawn = [draw_eyes(rng, WearerSettings()) for _ in range(3000)]

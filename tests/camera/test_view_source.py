@@ -12,8 +12,7 @@ import pytest
 
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.recordings import open_recording, record_frames
-from handcal.camera.settings import RealSenseSettings
-from handcal.camera.view_source import REALSENSE, ColorCamera, open_view_source
+from handcal.camera.view_source import ColorCamera, open_view_source
 from handcal.core.errors import CameraEndError, CameraError
 from handcal.core.types import CameraIdentity, Frame
 
@@ -64,32 +63,6 @@ def test_first_frames_without_colour_are_passed_over(
     with open_view_source(str(tmp_path / "late"), playback=PlaybackSettings(loop=True)) as camera:
         times = [camera.read()[1] for _ in range(2)]
     assert times == [second.t_camera_ns] * 2  # the second, without colour, between them
-
-
-def test_a_realsense_is_run_as_its_settings_say(
-    plug_in: Callable[..., object],
-) -> None:
-    plug_in()
-    settings = RealSenseSettings(profile="848x480")
-    with open_view_source(REALSENSE, settings) as camera:
-        image, _ = camera.read()
-    assert image.shape == (480, 848, 3)
-    with pytest.raises(CameraError, match="serial 9 is not connected"):
-        open_view_source(REALSENSE, RealSenseSettings(serial="9"))
-
-
-def test_a_video_is_played_over_and_over_at_its_pace(tmp_path: Path) -> None:
-    path = tmp_path / "view.avi"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 50.0, (64, 48))
-    for level in (50, 200):
-        writer.write(np.full((48, 64, 3), level, np.uint8))
-    writer.release()
-    with open_view_source(
-        str(path), playback=PlaybackSettings(real_time=True, loop=True)
-    ) as camera:
-        read = [camera.read() for _ in range(4)]
-    assert [round(float(image.mean()), -1) for image, _ in read] == [50, 200, 50, 200]
-    assert read[2][1] == read[0][1]
 
 
 def test_images_and_cameras_are_opened_by_what_they_are_called(tmp_path: Path) -> None:
