@@ -120,7 +120,7 @@ def test_a_wearer_in_another_process_aligns_and_confirms(
 
     pose = wait_for(pose_then)
     np.testing.assert_allclose(pose, T_W_H, atol=0.03)
-    wait_for(lambda: server.statistics().pose_rate_hz > 60.0 or None)
+    wait_for(lambda: server.statistics().pose_rate_hz > 20.0 or None)
     statistics = server.statistics()
     assert statistics.clock_offset_ms == pytest.approx(12345.0, abs=2.0)
     assert statistics.lost_inbound > 0
