@@ -102,7 +102,7 @@ def sense_depth(
     disparity = np.float32(fB) / depth_m
     if settings.fatten_px:
         disparity = _fattened(disparity, settings.fatten_px, rng)
-    hidden = _hidden_from_the_right(disparity)
+    hidden |= _hidden_from_the_right(disparity)
     hidden |= _blur_edges(disparity, rng)
     noise_px = _correlated_noise(disparity.shape, _CORRELATION_PX, rng)
     disparity += _DISPARITY_SIGMA_PX * noise_px
