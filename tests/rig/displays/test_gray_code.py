@@ -82,11 +82,3 @@ def test_what_is_missing_or_unusable_is_named(tmp_path: Path) -> None:
     for name, image in photographs().items():
         write_png(tmp_path / f"{name}.png", image)
     assert len(read_gray_code(tmp_path, *SIZE).pixels) > 60
-
-
-def test_neighbouring_cells_differ_in_one_digit() -> None:
-    patterns = dict(gray_patterns(200, 100, 4))
-    codes = np.stack([patterns[f"x-{digit}"][0] > 0 for digit in range(6)])
-    changes = (codes[:, 1:] != codes[:, :-1]).sum(axis=0)
-    assert set(changes.tolist()) == {0, 1}
-    assert (changes > 0).sum() == 200 // 4 - 1
