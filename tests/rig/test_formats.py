@@ -139,7 +139,7 @@ def test_a_whole_calibration_survives(tmp_path: Path) -> None:
         (ROS.replace("cols: 5", "cols: 4"), "distortion must have rows times cols"),
         (ROS.replace("[500, 0,", "[-5, 0,"), "fx is -5 px, but must lie between 64 and 6400"),
         (ROS.replace("image_width: 640", "image_width: 99999"), "between 1 and 16384"),
-        ('{"handcal_camera": 1, "width": [[1], [1, 2]]}', "width must be a finite number"),
+        ('{"handcal_camera": 1, "width": [[1], [1, 2]]}', "width must be a whole number"),
         ('{"handcal_camera": 2}', "the version known"),
     ],
 )
