@@ -73,7 +73,7 @@ def grid(arguments: argparse.Namespace) -> None:
 def gray(arguments: argparse.Namespace) -> None:
     """Make the Gray-code patterns that a display shows one after the other, in place of a grid."""
     from handcal.io.images import write_png
-    from handcal.rig.displays.gray_code import gray_patterns
+    from handcal.rig.displays.grid import gray_patterns
 
     made = dict(gray_patterns(*arguments.display))
     make_folder(arguments.output)
@@ -139,10 +139,14 @@ def display(arguments: argparse.Namespace) -> None:
     """Calibrate one eye's display from the viewpoint camera's images of its grid."""
     import numpy as np
 
-    from handcal.rig.assemble import with_display
-    from handcal.rig.displays.gray_code import flatness_arcmin, read_gray_code
+    from handcal.rig.displays.grid import flatness_arcmin, read_gray_code
     from handcal.rig.formats import read_intrinsics
-    from handcal.rig.steps import DisplayInputs, calibrate_by_gray_code, calibrate_eye_display
+    from handcal.rig.steps import (
+        DisplayInputs,
+        calibrate_by_gray_code,
+        calibrate_eye_display,
+        with_display,
+    )
 
     rig, eye = rig_or_example(arguments.rig), arguments.eye
     camera = read_intrinsics(arguments.camera_intrinsics)

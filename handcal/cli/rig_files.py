@@ -52,9 +52,8 @@ RIG_AND_OUTPUT = (
 )
 def make(arguments: argparse.Namespace) -> None:
     """Write the depth camera's pose, from stereo calibration or the factory, into a rig file."""
-    from handcal.rig.assemble import with_stereo
     from handcal.rig.formats import read_stereo
-    from handcal.rig.steps import identity_in, intrinsics_in, pose_in
+    from handcal.rig.steps import identity_in, intrinsics_in, pose_in, with_stereo
 
     if (arguments.stereo is None) == (arguments.factory is None):
         raise HandcalError("give either --stereo or --factory")
@@ -78,7 +77,7 @@ def make(arguments: argparse.Namespace) -> None:
 def _with_factory_pose(rig: Rig, arguments: argparse.Namespace) -> Rig:
     from handcal.camera.hololens2 import HoloLens2Camera, hololens2_settings
     from handcal.cli.display_check import network_server
-    from handcal.rig.assemble import with_factory_pose
+    from handcal.rig.steps import with_factory_pose
     from handcal.station.camera_pose import run_camera_pose
 
     settings = hololens2_settings(arguments.factory)

@@ -28,8 +28,18 @@ from handcal.export.trial_sections import (
 from handcal.register.benefit import BY_DISTANCE
 from handcal.register.results import Results
 from handcal.report.cells import length_mm
-from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
-from handcal.report.provenance import at_minute, made_with, settings_items
+from handcal.report.document import (
+    Column,
+    Figure,
+    Item,
+    Report,
+    Section,
+    Table,
+    at_minute,
+    facts,
+    made_with,
+    settings_items,
+)
 from handcal.session.comparison import read_comparisons
 from handcal.session.judged_trials import EyeTrials, eye_trials, is_doubted
 

@@ -31,9 +31,8 @@ from handcal.core.geometry import invert, project, rigid, transform
 from handcal.core.progress import Progress
 from handcal.core.types import EYES, Eye, EyeDisplay, Float64, Intrinsics, Rig, RigPart
 from handcal.io.images import image_named, read_grey
-from handcal.report.document import Column, Report, Section, Table, facts
-from handcal.report.provenance import made_with
-from handcal.report.write import write_report
+from handcal.report.document import Column, Report, Section, Table, facts, made_with
+from handcal.report.html import write_report
 from handcal.rig.boards.board import Board, BoardError, BoardView
 from handcal.rig.boards.views import ViewsError, image_files, pair_views, read_views
 from handcal.rig.displays.grid import Grid, GridView, find_grid, grid_on

@@ -20,7 +20,8 @@ from __future__ import annotations
 import logging
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, astuple, dataclass, fields
+from dataclasses import asdict, astuple, dataclass
+from dataclasses import fields as fields_of
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, TypeVar
 
@@ -38,7 +39,7 @@ from handcal.rig.lens.fit import CalibrationVerdict
 from handcal.rig.lens.lens import Camera, FisheyeIntrinsics, as_pinhole, camera_matrix_of
 from handcal.rig.lens.stereo import StereoCalibration
 from handcal.rig.plausible import check_intrinsics, identity_from_json, require
-from handcal.rig.storage import parse_tree
+from handcal.rig.rig_file import parse_tree
 
 CalibrationFormat: TypeAlias = Literal["opencv", "ros", "json"]
 CALIBRATION_FORMATS: tuple[CalibrationFormat, ...] = ("opencv", "ros", "json")
@@ -142,7 +143,7 @@ def read_stereo(path: Path) -> StereoCalibration:
     try:
         T_H_D = _pose_of_json(values)
         stored = _stored(_StoredStereo, values, "stereo")
-        values = {field.name: getattr(stored, field.name) for field in fields(_StoredStereo)}
+        values = {field.name: getattr(stored, field.name) for field in fields_of(_StoredStereo)}
         cameras = {name: _camera(values[name], name) for name in ("depth", "headset")}
         return StereoCalibration(**values | cameras | {"T_H_D": T_H_D})
     except ValueError as error:
@@ -186,7 +187,7 @@ def _stored(kind: type[Value], values: object, name: str) -> Value:
     except FileError as error:
         raise ValueError(str(error)) from error
     except TypeError as error:
-        needed = ", ".join(field.name for field in fields(kind))  # type: ignore[arg-type]
+        needed = ", ".join(field.name for field in fields_of(kind))  # type: ignore[arg-type]
         raise ValueError(f"{name} lacks one of the fields {needed}, or a camera in it") from error
 
 

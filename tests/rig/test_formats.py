@@ -29,7 +29,7 @@ from handcal.rig.formats import (
 from handcal.rig.lens.camera import calibrate_camera
 from handcal.rig.lens.lens import Camera, FisheyeIntrinsics
 from handcal.rig.lens.stereo import calibrate_stereo
-from handcal.rig.storage import MAX_STORAGE_BYTES
+from handcal.rig.rig_file import MAX_STORAGE_BYTES
 from handcal.sim.boards import board_poses, board_view
 
 FIVE = (0.1, -0.2, 1 / 3 * 1e-3, 0.002, 0.03)

@@ -17,7 +17,6 @@ from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.stand_in import ratio_of_means, reprojection_of_wearers
 from handcal.lab.bench.trials import Measured
 from handcal.report.statistics import MeanInterval
-from handcal.rig.assemble import screen_of, with_display, with_stereo
 from handcal.rig.boards.board import Board
 from handcal.rig.boards.views import BoardImage, board_image
 from handcal.rig.displays.grid import Grid, GridView, draw_grid, find_grid
@@ -33,6 +32,7 @@ from handcal.rig.example import FOCAL_PX, Z_E_S_M, example_rig
 from handcal.rig.lens.camera import calibrate_camera
 from handcal.rig.lens.stereo import calibrate_stereo
 from handcal.rig.lens.viewpoint import viewpoint_from_stereo
+from handcal.rig.steps import screen_of, with_display, with_stereo
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 from handcal.sim.viewpoint import VIEWPOINT_CAMERA, photograph_display
 

@@ -15,8 +15,16 @@ from handcal.lab.evaluate.cube_summary import ErrorSummary
 from handcal.lab.evaluate.cube_test import CubeRow, CubeTest
 from handcal.lab.methods.published import MISALIGNMENT
 from handcal.report.cells import interval_ends, mean_sd
-from handcal.report.document import Column, Figure, Report, Section, Table, facts
-from handcal.report.provenance import made_with, settings_items
+from handcal.report.document import (
+    Column,
+    Figure,
+    Report,
+    Section,
+    Table,
+    facts,
+    made_with,
+    settings_items,
+)
 from handcal.report.statistics import INTERVAL_METHOD
 from handcal.rig.cube import Cube
 

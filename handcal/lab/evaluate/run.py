@@ -33,7 +33,7 @@ from handcal.lab.settings import (
 )
 from handcal.lab.study.store import free_of_studies
 from handcal.report.document import Report
-from handcal.report.write import write_report
+from handcal.report.html import write_report
 from handcal.rig.cube import Cube, read_cube
 from handcal.rig.displays.grid import Grid, grid_on
 from handcal.rig.displays.homography import RotationWarp

@@ -11,8 +11,7 @@ from matplotlib.axes import Axes
 from handcal.core.types import UInt8
 from handcal.export.figures import name_axes
 from handcal.lab.evaluate.segmentation_sheet import contact_sheet
-from handcal.report.document import Column, Figure, Report, Section, Table, facts
-from handcal.report.provenance import made_with
+from handcal.report.document import Column, Figure, Report, Section, Table, facts, made_with
 
 _METHOD = (
     "Each frame is segmented on its own, as the first one of a camera, and compared with its true "

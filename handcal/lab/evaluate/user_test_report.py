@@ -10,8 +10,18 @@ from handcal.lab.evaluate.user_test import GroupErrors, UserTest, UserTestResult
 from handcal.lab.evaluate.user_test_figures import draw_corners, draw_wearers
 from handcal.lab.methods.published import REPROJECTION
 from handcal.report.cells import extremes, interval_ends, mean_sd, median_quartiles
-from handcal.report.document import Column, Figure, FigureRow, Item, Report, Section, Table, facts
-from handcal.report.provenance import at_minute, made_with
+from handcal.report.document import (
+    Column,
+    Figure,
+    FigureRow,
+    Item,
+    Report,
+    Section,
+    Table,
+    at_minute,
+    facts,
+    made_with,
+)
 from handcal.report.statistics import INTERVAL_METHOD
 from handcal.session.comparison import count_comparisons, read_comparisons
 from handcal.session.trial import calibration_numbers

@@ -33,7 +33,7 @@ from handcal.lab.study.store import StudyRow
 from handcal.lab.study.trials import BEST_ITERATE
 from handcal.lab.study.wearer_noise import NoiseFit, fit_noise
 from handcal.report.document import Report
-from handcal.report.write import write_report
+from handcal.report.html import write_report
 from handcal.sim.people import Variant
 
 _OTHERS = 2_000_003

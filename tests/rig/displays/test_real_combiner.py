@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from handcal.core.types import Float64
-from handcal.rig.displays.gray_code import held_out_arcmin
+from handcal.rig.displays.grid import held_out_arcmin
 
 # fx, fy, cx, cy of the undistorted maps, from cameraCalibration.json.
 CAMERAS = {"left": (285.05, 286.14, 425.86, 409.55), "right": (284.03, 285.05, 423.17, 401.85)}
