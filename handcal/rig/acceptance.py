@@ -447,7 +447,7 @@ def run_acceptance(settings: AcceptanceSettings, progress: Progress = Progress()
                 rig, rig.eyes[eye], images.homography, images.camera, images.pairs, depth_camera
             )
         except HandcalError as error:
-            raise HandcalError(f"{eye}: {error}") from error
+            raise HandcalError(f"{eye}: {error.what}", error.advice) from error
         tracked |= {f"{eye}/{name}": one for name, one in images.tracked.items()}
     move = camera_move(rig, tracked, depth_camera) if tracked else None
     problems = {eye: problem(one, settings.limit_arcmin) for eye, one in found.items()}
@@ -506,7 +506,7 @@ def _find_grid(picture: Path, grid: Grid) -> GridView:
     try:
         return find_grid(read_grey(picture), grid)
     except BoardError as error:
-        raise HandcalError(f"{picture}: {error}") from error
+        raise HandcalError(f"{picture}: {error.what}", error.advice) from error
 
 
 def _page(

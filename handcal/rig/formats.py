@@ -720,12 +720,12 @@ def read_tracked(path: Path) -> dict[str, Float64]:
     try:
         values = read_json(path)
     except FileError as error:
-        raise FileError(f"{error}", f"{_ADVICE}") from error
+        raise FileError(error.what, _ADVICE) from error
     if values.get("handcal_tracked") != TRACKED_VERSION:
         raise FileError(
             f"{path} holds no tracked poses that are known: handcal_tracked must be "
             f"{TRACKED_VERSION}",
-            f"{_ADVICE}",
+            _ADVICE,
         )
     poses = values.get("T_H_B")
     if not isinstance(poses, dict) or not 0 < len(poses) <= MAX_VIEWS:
