@@ -36,8 +36,9 @@ from handcal.report.html import write_report
 from handcal.rig.boards.board import Board, BoardError, BoardView
 from handcal.rig.boards.views import ViewsError, image_files, pair_views, read_views
 from handcal.rig.displays.grid import Grid, GridView, find_grid, grid_on
-from handcal.rig.displays.homography import DisplayHomography, fit_homography, undistort
+from handcal.rig.displays.homography import DisplayHomography, fit_homography
 from handcal.rig.formats import read_intrinsics, read_tracked
+from handcal.rig.lens.lens import undistort
 from handcal.rig.lens.shape import boards_seen
 from handcal.rig.lens.viewpoint import TrackedView, board_pose, locate_viewpoint
 from handcal.rig.rig_file import read_rig

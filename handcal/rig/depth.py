@@ -28,8 +28,8 @@ from handcal.hand.view import Box
 from handcal.report.cells import signed
 from handcal.rig.boards.board import BoardError, BoardView
 from handcal.rig.boards.views import ViewsError
-from handcal.rig.displays.homography import undistort
 from handcal.rig.lens.fit import clustered_covariance
+from handcal.rig.lens.lens import undistort
 from handcal.rig.lens.shape import BoardShape, boards_seen
 from handcal.rig.lens.viewpoint import board_pose
 from handcal.rig.plausible import MAX_RANGES

@@ -24,7 +24,7 @@ from handcal.core.types import Float64, Intrinsics, UInt8
 from handcal.io.images import image_named, read_image
 from handcal.rig.boards.board import Board, BoardError, BoardView, charuco
 from handcal.rig.boards.finder import find_board
-from handcal.rig.displays.homography import undistort
+from handcal.rig.lens.lens import undistort
 from handcal.rig.plausible import MAX_DEVICE_SIDE_PX
 
 # Boards are described in metres, grids in pixels: any constant scale works.
