@@ -103,6 +103,18 @@ def test_views_at_one_angle_are_bad() -> None:
     assert "one angle" in result.verdict.reason
 
 
+def test_views_that_are_hardly_tilted_ask_for_more() -> None:
+    rng = np.random.default_rng(1)
+    views = []
+    for number in range(25):
+        tilt_rad = rng.uniform(-0.15, 0.15, 2)
+        T_C_B = rigid([*tilt_rad, 0.1 * number], [*rng.uniform(-0.1, 0.0, 2), 0.4])
+        views.append(BoardImage(f"{number}", board_view(BOARD, T_C_B, CAMERA, rng, 0.002)))
+    result = calibrate_camera(views)
+    assert result.verdict.name == "needs more views"
+    assert "tilt" in result.verdict.reason
+
+
 def test_a_bad_image_is_named_and_may_be_dropped() -> None:
     views = list(_views())
     spoilt = views[4].found

@@ -197,6 +197,22 @@ def test_a_board_that_hardly_moved_is_named() -> None:
         calibrate_stereo(pairs, DEPTH, HEADSET)
 
 
+def test_cameras_too_far_apart_for_one_headset_are_bad() -> None:
+    """As with the squares' side entered in another unit."""
+    pairs = [
+        tuple(replace_found(one, points_m=20.0 * one.found.points_m) for one in pair if one.found)
+        for pair in _pairs()
+    ]
+    verdict = calibrate_stereo(pairs, DEPTH, HEADSET).verdict  # type: ignore[arg-type]
+    assert verdict.name == "bad"
+    assert "mm apart" in verdict.reason
+
+
+def replace_found(image: BoardImage, **changes: Float64) -> BoardImage:
+    assert image.found is not None
+    return dataclasses.replace(image, found=dataclasses.replace(image.found, **changes))  # type: ignore[arg-type]
+
+
 def test_a_few_bad_corners_are_left_out() -> None:
     pairs = list(_pairs())
     seen = pairs[0][1].found
