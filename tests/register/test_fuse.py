@@ -226,7 +226,7 @@ def test_more_alignments_are_worth_what_repetitions_bring(
     now, after = (
         fuse_alignments(all_, RIG, SETTINGS) for all_ in (once * times, once * times + two_more)
     )
-    foreseen_m2 = now.covariance_after_m2(alignments[0].eyes, 2)
+    foreseen_m2 = now.foreseen_m2([alignments[0].eyes] * 2)
     for eye, part in zip(EYES, (slice(0, 3), slice(3, 6)), strict=True):
         np.testing.assert_allclose(
             foreseen_m2[part, part], after.shifts[eye].covariance_m2, rtol=0.01, atol=1e-9

@@ -19,12 +19,11 @@ from numpy.typing import NDArray
 
 from handcal.core.errors import FileError, HandcalError
 from handcal.core.frozen import freeze
-from handcal.core.geometry import camera_matrix
 from handcal.core.types import Float64, Intrinsics, UInt8
 from handcal.io.images import image_named, read_image
 from handcal.rig.boards.board import Board, BoardError, BoardView, charuco
 from handcal.rig.boards.finder import find_board
-from handcal.rig.lens.lens import undistort
+from handcal.rig.lens.lens import to_plane
 from handcal.rig.plausible import MAX_DEVICE_SIDE_PX
 
 # Boards are described in metres, grids in pixels: any constant scale works.
@@ -260,9 +259,7 @@ def flatness_arcmin(
     width_px, height_px : int
         Size of the display.
     """
-    straight = undistort(seen.pixels, camera)
-    K = camera_matrix(camera)
-    rays = (straight - K[:2, 2]) / [K[0, 0], K[1, 1]]
+    rays = to_plane(seen.pixels, camera)
     return held_out_arcmin(seen.display_px / [width_px, height_px], rays)
 
 
@@ -270,13 +267,13 @@ def held_out_arcmin(display: Float64, rays: Float64, degree: int = _DEGREE) -> t
     """Return `flatness_arcmin` of points (N, 2), 0 to 1, and rays (N, 2) at z = 1."""
     field = np.floor(_FIELDS * display).sum(axis=1).astype(int) % 2 == 0
     flat, bent = [], []
-    for one in (field, ~field):
-        H = cv2.findHomography(display[one], rays[one])[0]
+    for half in (field, ~field):
+        H = cv2.findHomography(display[half], rays[half])[0]
         plane = np.asarray(cv2.perspectiveTransform(display[:, None], H), np.float64)[:, 0]
         terms = _terms(display, degree)
-        bend = np.linalg.lstsq(terms[one], (rays - plane)[one], rcond=None)[0]
-        flat.append(_arcmin(plane, rays)[~one])
-        bent.append(_arcmin(plane + terms @ bend, rays)[~one])
+        bend = np.linalg.lstsq(terms[half], (rays - plane)[half], rcond=None)[0]
+        flat.append(_arcmin(plane, rays)[~half])
+        bent.append(_arcmin(plane + terms @ bend, rays)[~half])
     first, second = (float(np.sqrt(np.mean(np.concatenate(off) ** 2))) for off in (flat, bent))
     return first, second
 
