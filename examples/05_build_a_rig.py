@@ -16,7 +16,6 @@ import numpy as np
 import handcal
 from handcal.cli.terminal import errors_in_one_line
 from handcal.core.types import EYES
-from handcal.rig.assemble import screen_of, with_display, with_stereo
 from handcal.rig.boards.views import BoardImage, image_files, pair_views, read_views, used
 from handcal.rig.compare import compare_rigs
 from handcal.rig.displays.grid import Grid, on_display
@@ -26,6 +25,7 @@ from handcal.rig.formats import read_tracked
 from handcal.rig.lens.camera import calibrate_camera
 from handcal.rig.lens.stereo import calibrate_stereo
 from handcal.rig.lens.viewpoint import viewpoint_from_tracked
+from handcal.rig.steps import screen_of, with_display, with_stereo
 from handcal.sim.photographs import BOARD, DEPTH_CAMERA, write_photographs
 
 

@@ -128,7 +128,7 @@ MUTANTS = (
     ),
     Mutant(
         "formulas in CSV",
-        "handcal/report/html.py",
+        "handcal/report/cells.py",
         "if isinstance(value, str) and value.startswith(_FORMULA_STARTS):",
         "if False:",
         "tests/report/test_document.py",

@@ -72,9 +72,8 @@ RIG_AND_OUTPUT = (
 )
 def make(arguments: argparse.Namespace) -> None:
     """Write the depth camera's pose, from stereo calibration or the factory, into a rig file."""
-    from handcal.rig.assemble import with_stereo
     from handcal.rig.formats import read_stereo
-    from handcal.rig.steps import identity_in, intrinsics_in, pose_in
+    from handcal.rig.steps import identity_in, intrinsics_in, pose_in, with_stereo
 
     if (arguments.stereo is None) == (arguments.factory is None):
         raise HandcalError("give either --stereo or --factory")
@@ -98,7 +97,7 @@ def make(arguments: argparse.Namespace) -> None:
 def _with_factory_pose(rig: Rig, arguments: argparse.Namespace) -> Rig:
     from handcal.camera.hololens2 import HoloLens2Camera, hololens2_settings
     from handcal.cli.display_check import network_server
-    from handcal.rig.assemble import with_factory_pose
+    from handcal.rig.steps import with_factory_pose
     from handcal.station.poses import run_camera_pose
 
     settings = hololens2_settings(arguments.factory)
@@ -279,7 +278,7 @@ def grid(arguments: argparse.Namespace) -> None:
 def gray(arguments: argparse.Namespace) -> None:
     """Make the Gray-code patterns that a display shows one after the other, in place of a grid."""
     from handcal.io.images import write_png
-    from handcal.rig.displays.gray_code import gray_patterns
+    from handcal.rig.displays.grid import gray_patterns
 
     made = dict(gray_patterns(*arguments.display))
     make_folder(arguments.output)
@@ -344,10 +343,14 @@ def display(arguments: argparse.Namespace) -> None:
     """Calibrate one eye's display from the viewpoint camera's images of its grid."""
     import numpy as np
 
-    from handcal.rig.assemble import with_display
-    from handcal.rig.displays.gray_code import flatness_arcmin, read_gray_code
+    from handcal.rig.displays.grid import flatness_arcmin, read_gray_code
     from handcal.rig.formats import read_intrinsics
-    from handcal.rig.steps import DisplayInputs, calibrate_by_gray_code, calibrate_eye_display
+    from handcal.rig.steps import (
+        DisplayInputs,
+        calibrate_by_gray_code,
+        calibrate_eye_display,
+        with_display,
+    )
 
     rig, eye = rig_or_example(arguments.rig), arguments.eye
     camera = read_intrinsics(arguments.camera_intrinsics)

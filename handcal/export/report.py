@@ -37,8 +37,19 @@ from handcal.report.cells import (
     median_quartiles,
     signed,
 )
-from handcal.report.document import Column, Figure, FigureRow, Item, Report, Section, Table, facts
-from handcal.report.provenance import at_minute, made_with, settings_items
+from handcal.report.document import (
+    Column,
+    Figure,
+    FigureRow,
+    Item,
+    Report,
+    Section,
+    Table,
+    at_minute,
+    facts,
+    made_with,
+    settings_items,
+)
 from handcal.report.statistics import mean_interval
 from handcal.session.drawn import ShiftKind
 from handcal.session.record import eye_trials

@@ -11,8 +11,17 @@ from handcal.core.types import EYES, Eye
 from handcal.export.tables import TableRow
 from handcal.register.verdict_words import VERDICT_WORDS
 from handcal.report.cells import NOTHING
-from handcal.report.document import Column, Figure, FigureRow, Report, Section, Table, facts
-from handcal.report.provenance import at_minute, made_with
+from handcal.report.document import (
+    Column,
+    Figure,
+    FigureRow,
+    Report,
+    Section,
+    Table,
+    at_minute,
+    facts,
+    made_with,
+)
 from handcal.report.statistics import summarise
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from handcal.core.errors import FileError
 from handcal.core.types import Eye
 from handcal.hand.settings import Roi
 from handcal.io.files import user_path
-from handcal.report.write import may_be_replaced
+from handcal.report.html import may_be_replaced
 from handcal.session.journal import JOURNAL, find_journals
 from handcal.sim.sensor import SensorName
 

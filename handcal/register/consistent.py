@@ -262,6 +262,7 @@ def fit_match(
     paired = np.exp(match.opened * match.opening.log_size) * seen_m
     T_fit = (1.0 - match.opened) * match.rigid.T_target_source
     T_fit += match.opened * match.opening.T_target_source
+    # The cursor points are those of the hand, moved: the rotation between them is taken out first.
     R, unturned = _unturned(paired, transform(T_cursor @ T_fit, hand_m))
     turn = _measure_turn(match, T_E, R, paired)
     R_turned = rotation_matrix(turn.share * turn.turned_rad)
@@ -278,6 +279,8 @@ def fit_match(
         cursor = transform(T_cursor, match.cursor_m)
         T_back = np.asarray(np.linalg.inv(T_cursor))
         kept = kept & _is_nearest(index, gap_m)
+    # Clouds of the same points, as simulated ones: pair, fit and move until no pair changes. The
+    # fit to exact pairs leaves nothing to balance.
     while same_points:
         fitted = hand[kept]
         _, partner = _unturned(shape[kept], cursor[index[kept]])

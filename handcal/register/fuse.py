@@ -127,10 +127,6 @@ class Fused:
         """The observations of the alignments, then those of the verifications."""
         return (*self.observed, *chain.from_iterable(self.verified.values()))
 
-    def covariance_after_m2(self, eyes: Sequence[Eye], count: int) -> Float64:
-        """Return the covariance to expect after more alignments with some eyes open."""
-        return self.foreseen_m2([eyes] * count)
-
     def foreseen_m2(
         self, upcoming: Sequence[Sequence[Eye]], then: Sequence[Observation] = ()
     ) -> Float64:

@@ -218,7 +218,7 @@ def conclude(
         if eye in fused.verified
     }
     verdicts = judge(rig, fused, advice, settings.verdict, contradictions, checked)
-    another_m2 = fused.covariance_after_m2(tuple(fused.shifts), 1)
+    another_m2 = fused.foreseen_m2([tuple(fused.shifts)])
     return Results(
         method=settings.method,
         alignments=dict(
@@ -292,13 +292,13 @@ def read_solved_shift_m(results: Mapping[str, Any] | None) -> dict[Eye, Float64]
     Eyes without three numbers are left out: results come from files, and None are no results.
     """
     eyes = (results or {}).get("eyes")
-    found: dict[Eye, Float64] = {}
+    shifts_m: dict[Eye, Float64] = {}
     for eye in EYES:
-        one = eyes.get(eye) if isinstance(eyes, dict) else None
-        if isinstance(one, dict):
+        values = eyes.get(eye) if isinstance(eyes, dict) else None
+        if isinstance(values, dict):
             with suppress(TypeError, ValueError):
-                found[eye] = np.array(one.get("shift_m"), np.float64).reshape(3)
-    return found
+                shifts_m[eye] = np.array(values.get("shift_m"), np.float64).reshape(3)
+    return shifts_m
 
 
 def read_rendered_shift_m(results: Mapping[str, Any] | None) -> dict[Eye, Float64]:
@@ -310,10 +310,10 @@ def read_rendered_shift_m(results: Mapping[str, Any] | None) -> dict[Eye, Float6
 
 
 def _benefit_json(benefit: Benefit) -> dict[str, Any]:
-    found = asdict(benefit)
-    depth = found.pop("depth")
-    del found["by_distance"]  # follows from the covariance; journals hold many results
-    return {"benefit": found, "depth": depth}
+    values = asdict(benefit)
+    depth = values.pop("depth")
+    del values["by_distance"]  # follows from the covariance; journals hold many results
+    return {"benefit": values, "depth": depth}
 
 
 def _advice_json(advice: Advice | None) -> dict[str, Any] | None:
@@ -323,9 +323,9 @@ def _advice_json(advice: Advice | None) -> dict[str, Any] | None:
 def _verified_json(verified: Verified | None) -> dict[str, Any]:
     if verified is None:
         return {}
-    found = asdict(verified)
-    before_after = [found.pop("before_arcmin"), found.pop("now_arcmin")]
-    return {"measured_arcmin": before_after, "verification": found}
+    values = asdict(verified)
+    before_after = [values.pop("before_arcmin"), values.pop("now_arcmin")]
+    return {"measured_arcmin": before_after, "verification": values}
 
 
 def _shift_json(shift: EyeShift) -> dict[str, Any]:

@@ -235,6 +235,7 @@ def measure_shape_change(cursor: Surface, hand: Surface, fit: RigidResult) -> Sh
         prior = len(rows.gap_m) / count * stiffness
         lacking = np.bincount(rows.index, 1.0 - far_weight, len(points))
         prior += _HELD * np.diag(shares.T @ lacking)
+        # Coordinates of a node lie side by side, and the prior is the same for each of them.
         for i in range(3):
             normal[i::3, i::3] += prior
         factor = _factor(normal)

@@ -85,11 +85,14 @@ def describe_surface(points_m: Float64, is_cut: Bool | None, max_points: int) ->
     around = np.ascontiguousarray(thinned.T).take(index[:, 1:].T.view(np.intp), axis=1)
     centroid = around.mean(axis=1)
     around -= centroid[:, None]
+    # Scatter matrices (3, 3, N); a surface is thinnest along its normal.
     scatter = np.einsum("ikn,jkn->ijn", around, around)
     normals, thickness_m2 = thinnest(scatter.transpose(2, 0, 1))
+    # At an edge all neighbours lie on one side: from their centroid to the point leads outwards.
     outward = thinned - centroid.T
     outward -= np.einsum("nd,nd->n", outward, normals)[:, None] * normals
     offset_m = np.sqrt(np.einsum("nd,nd->n", outward, outward))
+    # The radius of the neighbourhood in the tangent plane: the trace without the thickness.
     wide_m2 = scatter[0, 0] + scatter[1, 1] + scatter[2, 2] - thickness_m2
     radius_m = np.sqrt(np.maximum(wide_m2, 1e-18) / count)
     weight = np.clip((offset_m / radius_m - _EDGE_NONE) / (_EDGE_FULL - _EDGE_NONE), 0.0, 1.0)

@@ -161,16 +161,16 @@ def advise(
         counts = range(1, MOST_ALIGNMENTS + 1)
         return _best_advice(foresee(eyes, count) for count in counts for eyes in plans)
     unverified = [one for other, one in fused.verifiable.items() if other not in fused.verified]
-    found = [foresee((), count) for count in range(1, len(upcoming) + 1)]
+    options = [foresee((), count) for count in range(1, len(upcoming) + 1)]
     if unverified:
-        found += [foresee((), count, unverified) for count in range(len(upcoming) + 1)]
-    elif eye in fused.verified and not _best_advice(found).is_accepted:
-        found.append(foresee((), 0, [fused.verifiable[eye]]))
-    return _best_advice(found)
+        options += [foresee((), count, unverified) for count in range(len(upcoming) + 1)]
+    elif eye in fused.verified and not _best_advice(options).is_accepted:
+        options.append(foresee((), 0, [fused.verifiable[eye]]))
+    return _best_advice(options)
 
 
-def _best_advice(found: Iterable[Advice]) -> Advice:
-    return reduce(lambda best, one: one if _is_better_advice(one, best) else best, found)
+def _best_advice(options: Iterable[Advice]) -> Advice:
+    return reduce(lambda best, one: one if _is_better_advice(one, best) else best, options)
 
 
 def _is_better_advice(one: Advice, other: Advice) -> bool:

@@ -1,4 +1,4 @@
-"""A report as a self-contained HTML file, with its figures beside it."""
+"""A report as a self-contained HTML file with its figures beside it, and in all formats at once."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from handcal.io.resources import resource_path
 from handcal.report.cells import rows_csv
 from handcal.report.document import Figure, Report, Table
 from handcal.report.page import CONTENT_MM, MM_PER_INCH, add_strip
+from handcal.report.pdf import write_pdf
 
 _DPI = 200
 
@@ -103,3 +104,44 @@ def _printable(value: object) -> object:
     return "".join(
         char if char.isprintable() or char in ("\n", _NO_BREAK) else "\ufffd" for char in value
     )
+
+
+def write_report(
+    folder: Path, report: Report, progress: Progress = Progress()
+) -> tuple[Path, Path]:
+    """Write report.pdf, report.html, figures/NAME.png and figures/NAME.csv, each atomically.
+
+    Parameters
+    ----------
+    folder : Path
+        Created if needed.
+    report : Report
+    progress : Progress
+        Told the share done before each item, page and figure.
+
+    Returns
+    -------
+    tuple of Path
+        The PDF and the HTML.
+
+    Raises
+    ------
+    CancelledError
+    FileError
+        If a file cannot be written.
+    """
+    pdf, html = make_folder(folder) / "report.pdf", folder / "report.html"
+    write_pdf(pdf, report, progress.part(0.0, 0.4))
+    write_html(html, report, progress.part(0.4, 1.0))
+    progress.at(1.0)
+    return pdf, html
+
+
+def may_be_replaced(file: Path) -> bool:
+    """Return whether a PDF or HTML is empty, or was written by `write_report`."""
+    marks = b"/Creator (handcal ", b'name="generator" content="handcal '
+    try:
+        content = file.read_bytes()
+    except OSError:
+        return False
+    return not content or any(mark in content for mark in marks)

@@ -148,19 +148,15 @@ def _deskewed(bounds: Float64, values: Float64) -> Float64:
     """Return (mean - true mean) / sd at which Hall's transformation equals `bounds`."""
     if len(values) < _FEWEST_FOR_SKEWNESS or np.ptp(values) == 0.0:
         return bounds
-    skewness = _skewness(values)
+    # Imported here: scipy.stats takes 0.3 to 2 s, and few programs compute an interval.
+    from scipy.stats import skew
+
+    offsets = values - values.mean()
+    skewness = float(skew(offsets / np.abs(offsets).max(), bias=False))
     if abs(skewness) < _NO_SKEWNESS:
         return bounds
     shifted = skewness * (bounds - skewness / (6.0 * len(values)))
     return np.asarray((np.cbrt(1.0 + shifted) - 1.0) * 3.0 / skewness)
-
-
-def _skewness(values: Float64) -> float:
-    """Return the sample skewness, corrected for bias."""
-    count, offsets = len(values), values - values.mean()
-    offsets /= np.abs(offsets).max()
-    third, second = (offsets**3).mean(), (offsets**2).mean()
-    return float(np.sqrt(count * (count - 1.0)) / (count - 2.0) * third / second**1.5)
 
 
 def _groups(values: Float64, clusters: Sequence[object]) -> list[Float64]:

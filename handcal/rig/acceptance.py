@@ -31,14 +31,14 @@ from handcal.core.geometry import invert, project, rigid, transform
 from handcal.core.progress import Progress
 from handcal.core.types import EYES, Eye, EyeDisplay, Float64, Intrinsics, Rig, RigPart
 from handcal.io.images import image_named, read_grey
-from handcal.report.document import Column, Report, Section, Table, facts
-from handcal.report.provenance import made_with
-from handcal.report.write import write_report
+from handcal.report.document import Column, Report, Section, Table, facts, made_with
+from handcal.report.html import write_report
 from handcal.rig.boards.board import Board, BoardError, BoardView
 from handcal.rig.boards.views import ViewsError, image_files, pair_views, read_views
 from handcal.rig.displays.grid import Grid, GridView, find_grid, grid_on
-from handcal.rig.displays.homography import DisplayHomography, fit_homography, undistort
+from handcal.rig.displays.homography import DisplayHomography, fit_homography
 from handcal.rig.formats import read_intrinsics, read_tracked
+from handcal.rig.lens.lens import undistort
 from handcal.rig.lens.shape import boards_seen
 from handcal.rig.lens.viewpoint import TrackedView, board_pose, locate_viewpoint
 from handcal.rig.rig_file import read_rig
@@ -448,7 +448,7 @@ def run_acceptance(settings: AcceptanceSettings, progress: Progress = Progress()
                 rig, rig.eyes[eye], images.homography, images.camera, images.pairs, depth_camera
             )
         except HandcalError as error:
-            raise HandcalError(f"{eye}: {error}") from error
+            raise HandcalError(f"{eye}: {error.what}", error.advice) from error
         tracked |= {f"{eye}/{name}": one for name, one in images.tracked.items()}
     move = camera_move(rig, tracked, depth_camera) if tracked else None
     problems = {eye: problem(one, settings.limit_arcmin) for eye, one in found.items()}
@@ -507,7 +507,7 @@ def _find_grid(picture: Path, grid: Grid) -> GridView:
     try:
         return find_grid(read_grey(picture), grid)
     except BoardError as error:
-        raise HandcalError(f"{picture}: {error}") from error
+        raise HandcalError(f"{picture}: {error.what}", error.advice) from error
 
 
 def _page(

@@ -37,8 +37,8 @@ _AXES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
     "top": ((1, 0, 0), (0, 0, -1)),
     "bottom": ((1, 0, 0), (0, 0, 1)),
 }
-# From the middle of a face to the corners of its marker, as OpenCV orders them.
-_AROUND = 0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+# From the middle of a face to its corners and its marker's, as OpenCV orders them.
+_CORNERS = 0.5 * np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
 # In marker sides: corners farther than this from their predicted place belong to another cube.
 _MISFIT_SIDES = 0.05
 
@@ -100,7 +100,7 @@ def face_pose(cube: Cube, marker: int) -> Float64:
 
 def marker_corners_m(cube: Cube, markers: Iterable[int]) -> Float64:
     """Return the corners of markers, four each as OpenCV orders them, in the cube's frame."""
-    flat = np.column_stack([cube.marker_m * _AROUND, np.zeros(4)])
+    flat = cube.marker_m * _CORNERS
     return np.concatenate([transform(face_pose(cube, marker), flat) for marker in markers])
 
 
@@ -319,7 +319,6 @@ def _outline(first_m: Float64, last_m: Float64) -> Float64:
     )
 
 
-_CORNERS = 0.5 * np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
 _SMOOTHING_S = 0.3
 """Time constant while the cube moves slowly, and at most that many seconds at rest."""
 _JUMP_M, _JUMP_RAD = 0.01, 0.07

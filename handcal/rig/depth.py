@@ -26,8 +26,8 @@ from handcal.hand.view import Box, solid_surface
 from handcal.report.cells import signed
 from handcal.rig.boards.board import BoardError, BoardView
 from handcal.rig.boards.views import ViewsError
-from handcal.rig.displays.homography import undistort
 from handcal.rig.lens.fit import clustered_covariance
+from handcal.rig.lens.lens import to_plane
 from handcal.rig.lens.shape import BoardShape, boards_seen
 from handcal.rig.lens.viewpoint import board_pose
 from handcal.rig.plausible import MAX_RANGES
@@ -94,8 +94,7 @@ def depth_view(seen: BoardView, frame: Frame) -> DepthView:
     if len(places) < _LEAST_PIXELS or np.mean(depth > 0) < _LEAST_MEASURED:
         raise BoardError("the depth image shows too little of the board: hold it further inside")
     pixels = places[depth > 0][:, ::-1].astype(np.float64)
-    plane = (undistort(pixels, camera) - [camera.cx, camera.cy]) / [camera.fx, camera.fy]
-    rays = np.column_stack([plane, np.ones(len(plane))])
+    rays = np.column_stack([to_plane(pixels, camera), np.ones(len(pixels))])
     measured_m = frame.depth_scale_m * depth[depth > 0].astype(np.float64)
     normal = T_D_B[:3, 2]
     true_m = normal @ T_D_B[:3, 3] / (rays @ normal)
@@ -348,9 +347,7 @@ def _rays(box: Box, camera: Intrinsics) -> Float64:
     """Return the rays (h, w, 3) of a box of pixels, with z = 1."""
     x0, y0, x1, y1 = box
     pixels = np.stack(np.meshgrid(np.arange(x0, x1), np.arange(y0, y1)), axis=-1).astype(float)
-    if any(camera.distortion):
-        pixels = undistort(pixels.reshape(-1, 2), camera).reshape(pixels.shape)
-    plane = (pixels - [camera.cx, camera.cy]) / [camera.fx, camera.fy]
+    plane = to_plane(pixels.reshape(-1, 2), camera).reshape(pixels.shape)
     return np.concatenate([plane, np.ones((*plane.shape[:2], 1))], axis=-1)
 
 

@@ -20,9 +20,10 @@ from __future__ import annotations
 import logging
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, astuple
+from dataclasses import asdict, astuple, dataclass
+from dataclasses import fields as fields_of
 from pathlib import Path
-from typing import Any, Literal, TypeAlias, TypeVar, cast, get_args
+from typing import Any, Literal, TypeAlias, TypeVar
 
 import cv2
 import numpy as np
@@ -31,13 +32,14 @@ from handcal.core.errors import FileError, HandcalError
 from handcal.core.geometry import is_rigid, rigid
 from handcal.core.types import CameraIdentity, Float64, Intrinsics
 from handcal.io.files import read_json, read_limited, write_atomic, write_json
+from handcal.io.settings import known_settings, read_settings
 from handcal.rig.boards.views import MAX_VIEWS, WorstView
 from handcal.rig.lens.camera import CameraCalibration
-from handcal.rig.lens.fit import CalibrationVerdict, CalibrationVerdictName
+from handcal.rig.lens.fit import CalibrationVerdict
 from handcal.rig.lens.lens import Camera, FisheyeIntrinsics, as_pinhole, camera_matrix_of
 from handcal.rig.lens.stereo import StereoCalibration
 from handcal.rig.plausible import check_intrinsics, identity_from_json, require
-from handcal.rig.storage import parse_tree
+from handcal.rig.rig_file import parse_tree
 
 CalibrationFormat: TypeAlias = Literal["opencv", "ros", "json"]
 CALIBRATION_FORMATS: tuple[CalibrationFormat, ...] = ("opencv", "ros", "json")
@@ -140,30 +142,53 @@ def read_stereo(path: Path) -> StereoCalibration:
     values = read_json(path)
     try:
         T_H_D = _pose_of_json(values)
-        covariance = values.get("covariance")
-        worst, verdict = (_object(values, key) for key in ("worst", "verdict"))
-        residuals_px = _object(values, "residuals_px")
-        name = verdict.get("name")
-        require(name in get_args(CalibrationVerdictName), "verdict.name must be a known one")
-        return StereoCalibration(
-            T_H_D=T_H_D,
-            covariance=None if covariance is None else _numbers(covariance, "covariance", 2),
-            depth=_camera(_object(values, "depth"), "depth"),
-            headset=_camera(_object(values, "headset"), "headset"),
-            rms_px=_number(values, "rms_px"),
-            residuals_px={key: _number(residuals_px, key) for key in residuals_px},
-            spread_rad=_number(values, "spread_rad"),
-            spread_m=_number(values, "spread_m"),
-            dropped=tuple(map(str, _list(values, "dropped"))),
-            worst=WorstView(
-                str(worst.get("name")), _number(worst, "rms_px"), str(worst.get("why"))
-            ),
-            verdict=CalibrationVerdict(
-                cast(CalibrationVerdictName, name), str(verdict.get("reason"))
-            ),
-        )
+        stored = _stored(_StoredStereo, values, "stereo")
+        values = {field.name: getattr(stored, field.name) for field in fields_of(_StoredStereo)}
+        cameras = {name: _camera(values[name], name) for name in ("depth", "headset")}
+        return StereoCalibration(**values | cameras | {"T_H_D": T_H_D})
     except ValueError as error:
         raise FileError(f"{path}: {error}") from error
+
+
+@dataclass(frozen=True, slots=True)
+class _StoredCamera:
+    """What is read of a camera's JSON."""
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    distortion: tuple[float, ...] = ()
+    lens: Literal["pinhole", "fisheye"] = "pinhole"
+
+
+@dataclass(frozen=True, slots=True)
+class _StoredStereo:
+    """What is read of a stereo calibration's JSON, beside the pose."""
+
+    covariance: Float64 | None
+    depth: _StoredCamera
+    headset: _StoredCamera
+    rms_px: float
+    residuals_px: Mapping[str, float]
+    spread_rad: float
+    spread_m: float
+    dropped: tuple[str, ...]
+    worst: WorstView
+    verdict: CalibrationVerdict
+
+
+def _stored(kind: type[Value], values: object, name: str) -> Value:
+    """Return the fields of a kind in JSON values, without others; ValueError if one is wrong."""
+    try:
+        return read_settings(kind, known_settings(kind, values), name)
+    except FileError as error:
+        raise ValueError(str(error)) from error
+    except TypeError as error:
+        needed = ", ".join(field.name for field in fields_of(kind))  # type: ignore[arg-type]
+        raise ValueError(f"{name} lacks one of the fields {needed}, or a camera in it") from error
 
 
 def read_identity(path: Path) -> CameraIdentity:
@@ -316,28 +341,24 @@ def _matrix_in(path: Path) -> list[float] | None:
 
 def _camera_of_json(values: dict[str, Any]) -> Camera:
     _check_version(values, "handcal_camera")
-    return _camera(values, "camera")
+    return _camera(_stored(_StoredCamera, values, "camera"), "camera")
 
 
-def _camera(values: dict[str, Any], name: str) -> Camera:
-    width, height, fx, fy, cx, cy = (
-        _number(values, key) for key in ("width", "height", "fx", "fy", "cx", "cy")
-    )
-    require(width == int(width) and height == int(height), f"{name}: the size must be whole")
-    distortion = _numbers(values.get("distortion", []), "distortion", 1)
-    intrinsics = Intrinsics(int(width), int(height), fx, fy, cx, cy, tuple(distortion.tolist()))
-    check_intrinsics(name, intrinsics)
-    lens = values.get("lens", "pinhole")
-    require(lens in ("pinhole", "fisheye"), f"{name}: the lens {lens} is not known")
+def _camera(stored: _StoredCamera, name: str) -> Camera:
+    values = asdict(stored)
+    lens = values.pop("lens")
+    check_intrinsics(name, Intrinsics(**values))
     if lens == "pinhole":
-        return intrinsics
-    require(len(distortion) == 4, f"{name}: a fisheye has 4 coefficients")
-    return FisheyeIntrinsics(**asdict(intrinsics))
+        return Intrinsics(**values)
+    require(len(stored.distortion) == 4, f"{name}: a fisheye has 4 coefficients")
+    return FisheyeIntrinsics(**values)
 
 
 def _pose_of_json(values: dict[str, Any]) -> Float64:
     _check_version(values, "handcal_stereo")
-    return _pose(_numbers(values.get("T_H_D"), "T_H_D", 2))
+    T = array_of(values.get("T_H_D"), "T_H_D")
+    require(len(T) == 16, "T_H_D must have 4 rows of 4 numbers")
+    return _pose(T.reshape(4, 4))
 
 
 def _has_pose(values: dict[str, Any]) -> bool:
@@ -375,39 +396,6 @@ def _pose(T: Float64) -> Float64:
 
 def _check_version(values: dict[str, Any], key: str) -> None:
     require(values.get(key) == JSON_VERSION, f"{key} must be {JSON_VERSION}, the version known")
-
-
-def _object(values: dict[str, Any], key: str) -> dict[str, Any]:
-    value = values.get(key)
-    if not isinstance(value, dict):
-        raise ValueError(f"{key} must be an object")
-    return value
-
-
-def _list(values: dict[str, Any], key: str) -> list[Any]:
-    value = values.get(key)
-    if not isinstance(value, list):
-        raise ValueError(f"{key} must be a list")
-    return value
-
-
-def _number(values: dict[str, Any], key: str) -> float:
-    return float(_numbers(values.get(key), key, 0))
-
-
-def _numbers(values: object, name: str, dimensions: int) -> Float64:
-    """Return nested lists of finite JSON numbers as an array; their depth is `dimensions`."""
-    try:
-        array = np.array(values)
-    except ValueError:  # lists of different lengths
-        array = np.array(None)
-    is_empty = array.shape == (0,) and dimensions == 1
-    require(
-        array.ndim == dimensions
-        and (is_empty or (array.dtype.kind in "if" and bool(np.isfinite(array).all()))),
-        f"{name} must hold finite numbers" if dimensions else f"{name} must be a finite number",
-    )
-    return array.astype(np.float64)
 
 
 def _coefficients(intrinsics: Camera) -> Float64:
@@ -732,12 +720,12 @@ def read_tracked(path: Path) -> dict[str, Float64]:
     try:
         values = read_json(path)
     except FileError as error:
-        raise FileError(f"{error}", f"{_ADVICE}") from error
+        raise FileError(error.what, _ADVICE) from error
     if values.get("handcal_tracked") != TRACKED_VERSION:
         raise FileError(
             f"{path} holds no tracked poses that are known: handcal_tracked must be "
             f"{TRACKED_VERSION}",
-            f"{_ADVICE}",
+            _ADVICE,
         )
     poses = values.get("T_H_B")
     if not isinstance(poses, dict) or not 0 < len(poses) <= MAX_VIEWS:

@@ -27,6 +27,12 @@ class SensorSettings:
     fatten_px: float = 0.0
     """Width by which near surfaces grow over what is behind them, half of the matching window; on a
     D4xx 1 to 3 px. Of a fraction, as large a share of the edges grows by one more."""
+    disparities: int | None = None
+    """Number of disparities that the matching tries, 126 on a D4xx: what is nearer than f B over
+    the largest of them, 0.44 m at 1280x720, has no depth. None: as many as needed."""
+    disparity_shift: int = 0
+    """Smallest disparity that it tries. A shift brings the nearest distance closer and loses what
+    is farther than f B over the shift."""
     depth_scale_m: float = 0.0001
     """Metres per unit."""
 
@@ -100,6 +106,7 @@ def sense_depth(
     """
     fB = focal_px * _BASELINE_M
     disparity = np.float32(fB) / depth_m
+    hidden = _not_tried(disparity, settings)
     if settings.fatten_px:
         disparity = _fattened(disparity, settings.fatten_px, rng)
     hidden |= _hidden_from_the_right(disparity)
@@ -126,6 +133,14 @@ def _fattened(disparity: Float32, by_px: float, rng: np.random.Generator) -> Flo
         return grown(whole)
     more = _correlated_noise(disparity.shape, _PATCH_PX, rng) < ndtri(by_px - whole)
     return np.where(more, grown(whole + 1), grown(whole))
+
+
+def _not_tried(disparity: Float32, settings: SensorSettings) -> Bool:
+    """Return the pixels whose disparity is not among those that the matching tries."""
+    missed = disparity < settings.disparity_shift
+    if settings.disparities is not None:
+        missed |= disparity > settings.disparity_shift + settings.disparities
+    return np.asarray(missed)
 
 
 def _hidden_from_the_right(disparity: Float32) -> Bool:

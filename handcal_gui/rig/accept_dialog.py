@@ -22,11 +22,11 @@ from handcal.rig.acceptance import (
     run_acceptance,
     view_rows,
 )
-from handcal.rig.assemble import screen_of
 from handcal.rig.boards.board import Board
 from handcal.rig.boards.choose import ALIKE, ChooseSettings
 from handcal.rig.displays.grid import grid_on
 from handcal.rig.rig_file import write_rig
+from handcal.rig.steps import screen_of
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr

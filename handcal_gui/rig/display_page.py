@@ -11,10 +11,9 @@ from PySide6.QtWidgets import QWidget
 from handcal.core.errors import FileError, HandcalError
 from handcal.core.types import Eye
 from handcal.io.images import write_png
-from handcal.rig.assemble import screen_of
 from handcal.rig.boards.choose import ALIKE
 from handcal.rig.displays.grid import Grid, draw_grid, grid_on
-from handcal.rig.steps import ASKED_BOARDS, ASKED_GRIDS, view_in
+from handcal.rig.steps import ASKED_BOARDS, ASKED_GRIDS, screen_of, view_in
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.app.translation import tr
 from handcal_gui.rig.file_dialogs import ask_save

@@ -8,11 +8,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from handcal.core.types import EYES, Eye, Float64, Rig
-from handcal.rig.assemble import STEREO_PARAMETERS
 from handcal.rig.compare import compare_rigs
 from handcal.rig.displays.homography import DISPLAY_PARAMETERS, DisplayCalibration
 from handcal.rig.lens.camera import CameraCalibration
 from handcal.rig.lens.stereo import StereoCalibration
+from handcal.rig.steps import STEREO_PARAMETERS
 from handcal_gui.app.translation import tr
 from handcal_gui.rig.lens_fields import LENSES
 from handcal_gui.widgets.number_label import UNKNOWN

@@ -10,7 +10,6 @@ from pathlib import Path
 from handcal.core.errors import HandcalError
 from handcal.core.types import Eye, Rig
 from handcal.io.files import write_json
-from handcal.rig.assemble import with_display, with_stereo
 from handcal.rig.boards.views import BoardImage, WorstView
 from handcal.rig.formats import camera_json, read_intrinsics
 from handcal.rig.lens.camera import calibrate_camera, tilt
@@ -24,6 +23,8 @@ from handcal.rig.steps import (
     identity_in,
     intrinsics_in,
     pose_in,
+    with_display,
+    with_stereo,
 )
 from handcal_gui.app.translation import tr
 from handcal_gui.rig.project_folder import (

@@ -8,10 +8,8 @@ from handcal import solve_eye_shift
 from handcal.core.types import Bool, Float64, Method
 from handcal.lab.bench.trials import mean_length_mm, trial_alignment, trial_hand
 from handcal.lab.study.trials import floor_error_m, solve_trial
-from handcal.register import consistent
-from handcal.register.consistent import CUT_BAND_M, common_cut
+from handcal.register.consistent import common_cut
 from handcal.register.solve import solve_alignment
-from handcal.register.surface import clip_surface, describe_surface, nearest
 from handcal.rig.example import example_rig
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment
 from handcal.sim.overlay import overlay_by_eye
@@ -62,17 +60,6 @@ def test_clean_pairs_give_the_shift_exactly(exact: bool) -> None:
         np.testing.assert_allclose(solve_trial(made, "consistent").shift_m, made.shift_m, atol=2e-5)
 
 
-def test_the_paper_factor_falls_short_by_depth_over_distance() -> None:
-    shares = []
-    for number in range(3):
-        made = trial_alignment(_trial(number), 0.0, AlignmentSettings(count=800))
-        solved = solve_trial(made, "paper")
-        shares.append(1.0 - solved.shift_m[2] / made.shift_m[2])
-        np.testing.assert_allclose(solved.shift_m[:2], made.shift_m[:2], atol=0.001)
-    # A hand at 0.42 to 0.58 m, a display at 2 m.
-    assert 0.15 < np.mean(shares) < 0.35
-
-
 @pytest.mark.parametrize("along_m", [-0.010, 0.010])
 def test_a_wearer_who_errs_nowhere_is_solved_without_bias(along_m: float) -> None:
     """Data made by rays through a display, in which no solver's equation takes part."""
@@ -109,7 +96,7 @@ def test_cuts_noise_and_samples_cost_little_beside_the_turn(angle_deg: float) ->
     assert mean_length_mm(_errors_m([_uncut(made) for made in alignments])) < floor_mm + 1.0
 
 
-@pytest.mark.parametrize("angle_deg", [0.0, 2.0, 5.0, 9.0, 14.0, 20.0])
+@pytest.mark.parametrize("angle_deg", [0.0, 5.0, 20.0])
 def test_clean_clouds_keep_to_the_floor(angle_deg: float) -> None:
     making = AlignmentSettings(count=1500)
     alignments = [trial_alignment(_trial(number), angle_deg, making) for number in range(10)]
@@ -141,22 +128,6 @@ def test_the_covariance_is_honest() -> None:
     assert abs(np.mean(squares) - 3.0) < 3.0 * sigma
     # 95 % of them lie below 7.8.
     assert np.mean(np.array(squares) < 7.8) > 0.85
-
-
-def test_the_thinned_points_give_the_shift_of_all() -> None:
-    made = _measured(1, 3.0)
-    clouds = made.cursor_m, made.hand_m, made.cursor_cut, made.hand_cut
-    match = consistent.match_hands(*clouds)
-    assert len(match.thinned_m) < 0.5 * len(made.hand_m)
-    _, _, kept = match.pairs
-    of_all, of_some = (
-        consistent.fit_match(one, made.T_E_W, made.display_distance_m)
-        for one in (replace(match, thinned_m=made.hand_m[kept]), match)
-    )
-    assert of_some.inlier_ratio == of_all.inlier_ratio
-    moved_m = of_some.shift_m - of_all.shift_m
-    assert np.any(moved_m != 0.0)
-    assert moved_m @ np.linalg.solve(of_all.covariance_m2, moved_m) < 0.1
 
 
 def test_what_is_cut_is_no_inlier() -> None:
@@ -233,17 +204,6 @@ def test_both_clouds_end_at_the_same_place() -> None:
         for cloud in (made.cursor_m[cursor_kept], made.hand_m[hand_kept])
     ]
     assert ends[0] == pytest.approx(ends[1], abs=0.004)
-
-    surface = describe_surface(made.hand_m, made.hand_cut, 1000)
-    clipped = clip_surface(surface, surface.points_m @ along - limit_m, CUT_BAND_M)
-    place = clipped.points_m @ along
-    assert place.max() <= limit_m
-    assert clipped.near_cut[place > limit_m - CUT_BAND_M].all()
-    assert not clipped.near_cut[clipped.outline].any()
-    assert 0.6 * len(surface.points_m) < len(clipped.points_m) < len(surface.points_m)
-    distance_m, index = nearest(clipped.tree, clipped.points_m)
-    assert not distance_m.any()
-    np.testing.assert_array_equal(index, np.arange(len(clipped.points_m)))
 
 
 def test_a_cut_that_is_not_across_the_forearm_is_left_alone() -> None:

@@ -12,7 +12,6 @@ from handcal.core.types import (
     DepthCheck,
     DepthEdges,
     Eye,
-    EyeDistance,
     EyeShift,
     Float64,
     Verification,
@@ -25,7 +24,7 @@ from handcal.register.shape import Opening
 from handcal.register.sitting import SittingSettings
 from handcal.register.solve import solve_alignment, with_eye_box
 from handcal.register.surface import describe_surface
-from handcal.rig.example import HALF_EYE_DISTANCE_M, example_rig
+from handcal.rig.example import example_rig
 from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.placement import overlay_hand, view_through
 from handcal.sim.raster import visible_points
@@ -227,60 +226,11 @@ def test_more_alignments_are_worth_what_repetitions_bring(
     now, after = (
         fuse_alignments(all_, RIG, SETTINGS) for all_ in (once * times, once * times + two_more)
     )
-    foreseen_m2 = now.covariance_after_m2(alignments[0].eyes, 2)
+    foreseen_m2 = now.foreseen_m2([alignments[0].eyes] * 2)
     for eye, part in zip(EYES, (slice(0, 3), slice(3, 6)), strict=True):
         np.testing.assert_allclose(
             foreseen_m2[part, part], after.shifts[eye].covariance_m2, rtol=0.01, atol=1e-9
         )
-
-
-def test_a_measured_eye_distance_is_what_both_eyes_at_once_cannot_see() -> None:
-    true_m: dict[Eye, Float64] = {
-        "left": np.array([-0.002, 0.0, 0.0]),
-        "right": np.array([0.002, 0.0, 0.0]),
-    }
-    both = (BOTH, {eye: _shift(np.zeros(3)) for eye in EYES})
-    measured = EyeDistance(2 * HALF_EYE_DISTANCE_M + 0.004)
-    without, fused = (
-        fuse_alignments([both] * 4, RIG, SETTINGS, known) for known in (None, measured)
-    )
-    for eye, shift_m in true_m.items():
-        np.testing.assert_allclose(without.shifts[eye].shift_m, 0.0, atol=5e-5)
-        np.testing.assert_allclose(fused.shifts[eye].shift_m, shift_m, atol=8e-4)
-        assert fused.shifts[eye].sigma_m[0] < 0.6 * without.shifts[eye].sigma_m[0]
-
-
-def test_the_position_of_the_head_does_not_matter() -> None:
-    shift = _shift(np.array([0.002, -0.001, 0.003]))
-    for eyes in (EYES, ("left",)):
-        here, there = (
-            fuse_alignments([(_flat_hand(eyes, T), dict.fromkeys(eyes, shift))], RIG, SETTINGS)
-            for T in (np.eye(4), rigid([0.3, -1.2, 1.0], [0.5, 0.1, -0.4]))
-        )
-        np.testing.assert_allclose(
-            here.shifts["left"].shift_m, there.shifts["left"].shift_m, atol=1e-8
-        )
-        np.testing.assert_allclose(
-            here.covariance_after_m2(("left",), 3), there.covariance_after_m2(("left",), 3),
-            atol=1e-13,
-        )  # fmt: skip
-
-
-def test_the_fit_of_all_alignments_is_summed_up() -> None:
-    good = _shift(np.zeros(3))
-    bad = EyeShift(
-        np.zeros(3), REGISTRATION_M2, 0.003, np.zeros(7), 0.5, 40, False, "limit", np.ones(40), "x"
-    )
-    fused = fuse_alignments(
-        [(ONE["left"], {"left": good}), (ONE["left"], {"left": bad})], RIG, SETTINGS
-    ).shifts["left"]
-    assert fused.method == "fused"
-    assert fused.rms_m == pytest.approx(np.sqrt((1e-6 + 9e-6) / 2))
-    assert fused.inlier_ratio == pytest.approx(0.7)
-    assert fused.iterations == 48
-    assert not fused.converged
-    assert fused.stop_reason == "done; limit"
-    assert len(fused.residuals_m) == 12
 
 
 def test_eye_box_weighs_as_a_prior_should() -> None:

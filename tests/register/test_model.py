@@ -9,7 +9,6 @@ from handcal.core.geometry import project, transform
 from handcal.register.model import (
     balanced_turn,
     cursor_displacement,
-    design,
     fit_shift,
     nudged_shift_m,
     predict,
@@ -30,16 +29,6 @@ def test_known_pairs_give_the_shift(exact: bool, shift_m: np.ndarray, distance_m
     np.testing.assert_allclose(found_m, shift_m, atol=1e-9)
 
 
-@both_factors
-@given(shift_m=SHIFTS, distance_m=DISTANCES)
-def test_rows_hold_for_what_is_predicted(
-    exact: bool, shift_m: np.ndarray, distance_m: float
-) -> None:
-    cursor_m = predict(HAND_M, shift_m, distance_m, exact=exact)
-    rows = design(cursor_m, HAND_M, distance_m, exact=exact)
-    np.testing.assert_allclose(rows @ shift_m, cursor_m - HAND_M, atol=1e-12)
-
-
 @given(shift_m=SHIFTS, distance_m=DISTANCES)
 def test_cursor_and_hand_fall_on_one_pixel(shift_m: np.ndarray, distance_m: float) -> None:
     # The offline model draws the cursor; the eye at φ sees the hand. Either factor, one pixel.
@@ -48,15 +37,6 @@ def test_cursor_and_hand_fall_on_one_pixel(shift_m: np.ndarray, distance_m: floa
     for exact in (False, True):
         cursor_m = predict(HAND_M, shift_m, distance_m, exact=exact)
         np.testing.assert_allclose(project(offline, cursor_m), seen, atol=1e-12)
-
-
-@given(shift_m=SHIFTS, distance_m=DISTANCES)
-def test_the_exact_factor_keeps_the_hands_size(shift_m: np.ndarray, distance_m: float) -> None:
-    facing_m = HAND_M * [1, 1, 0] + [0, 0, 0.5]
-    cursor_m = predict(facing_m, shift_m, distance_m, exact=True)
-    np.testing.assert_allclose(
-        cursor_m - cursor_m.mean(axis=0), facing_m - facing_m.mean(axis=0), atol=1e-12
-    )
 
 
 @given(drawn_m=SHIFTS)
@@ -70,16 +50,6 @@ def test_a_cursor_drawn_with_another_shift_looks_like_one_drawn_offline(
     # A hand where the cursor is needs the very shift that the cursor is drawn with.
     found_m = fit_shift(as_offline_m, cursor_m, 2.0, exact=True)
     np.testing.assert_allclose(found_m, drawn_m, atol=1e-12)
-
-
-def test_fit_is_the_least_squares_one() -> None:
-    rng = np.random.default_rng(1)
-    shift_m = np.array([0.004, -0.002, 0.006])
-    cursor_m = predict(HAND_M, shift_m, 2.0, exact=True) + rng.normal(0.0, 0.002, HAND_M.shape)
-    found_m = fit_shift(cursor_m, HAND_M, 2.0, exact=True)
-    A = design(cursor_m, HAND_M, 2.0, exact=True).reshape(-1, 3)
-    expected = np.linalg.lstsq(A, (cursor_m - HAND_M).ravel())[0]
-    np.testing.assert_allclose(found_m, expected, atol=1e-12)
 
 
 @given(turned_rad=st.tuples(*[st.floats(-0.16, 0.16)] * 3).map(np.array))

@@ -87,6 +87,16 @@ def test_the_cursor_is_on_the_display() -> None:
     assert inside.all(axis=1).mean() > 0.6
 
 
+def test_no_cursor_is_put_where_a_display_shows_little_of_the_hand(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    eyes = {eye: replace(display, width_px=500) for eye, display in RIG.eyes.items()}
+    monkeypatch.setitem(globals(), "RIG", replace(RIG, eyes=eyes))
+    planned = _next()
+    assert planned is not None
+    assert "no other place is on the displays" in planned.reason
+
+
 def test_the_papers_cursor_is_where_the_hand_is() -> None:
     planned = _next(plan="paper")
     assert planned is not None

@@ -15,7 +15,6 @@ from handcal.register.prior import (
     eye_prior,
     learn_prior,
     learn_wearers,
-    posterior,
     widened,
 )
 from handcal.register.sitting import SittingSettings, sitting_prior
@@ -54,23 +53,6 @@ def test_many_sessions_find_the_population(seen_by: list[Float64]) -> None:
     seen_m = np.sqrt(np.diag(BOTH @ covariance_m2 @ BOTH.T))
     true_m = np.sqrt(np.diag(BOTH @ COVARIANCE_M2 @ BOTH.T))
     np.testing.assert_allclose(seen_m, true_m, rtol=0.2)
-
-
-def test_thirty_sessions_predict_the_next_wearer_better_than_the_default() -> None:
-    rng = np.random.default_rng(2)
-    learned = learn_prior([_session(rng, [BOTH]) for _ in range(30)])
-    lab, default = eye_prior(PriorSettings(learned=learned)), eye_prior()
-    assert lab.sessions == 30
-    errors_m = []
-    for _ in range(300):
-        true_m = rng.multivariate_normal(MEAN_M, COVARIANCE_M2)
-        noise_m2 = 0.003**2 * np.eye(3)
-        seen = BOTH, rng.multivariate_normal(BOTH @ true_m, noise_m2), noise_m2
-        errors_m.append(
-            [np.linalg.norm(posterior(prior, [seen])[0] - true_m) for prior in (lab, default)]
-        )
-    with_lab_m, with_default_m = np.mean(errors_m, axis=0)
-    assert with_lab_m < 0.85 * with_default_m
 
 
 def test_a_learned_prior_is_a_setting_that_can_be_stored() -> None:

@@ -134,10 +134,6 @@ def _with(points_m: Float64, value: float) -> Float64:
     [
         ({"method": "magic"}, "unknown method 'magic': choose from paper, linear, consistent, icp"),
         ({"display_distance_m": 0.0}, "display_distance_m must be positive, got 0.0"),
-        ({"display_distance_m": -2.0}, "display_distance_m must be positive, got -2.0"),
-        ({"display_distance_m": np.nan}, "display_distance_m must be positive, got nan"),
-        ({"T_E_W": np.eye(3)}, "T_E_W must be a rigid transform"),
-        ({"T_E_W": np.full((4, 4), np.nan)}, "T_E_W must be a rigid transform"),
         ({"T_E_W": np.zeros((4, 4))}, "T_E_W must be a rigid transform"),
         ({"cursor_cut": np.zeros(7, dtype=bool)}, "cursor_cut must hold one bool for each of the"),
         ({"hand_cut": np.zeros(1500)}, "hand_cut must hold one bool for each of the"),

@@ -86,21 +86,6 @@ def test_near_cut_edge_as_by_all_distances() -> None:
     assert not near_cut_edge(far_m, cloud_m, is_cut, spacing_m).any()
 
 
-def test_thinning_takes_some_of_the_points_always_the_same(square_m: Float64) -> None:
-    one, again = (describe_surface(square_m, None, 300) for _ in range(2))
-    assert 150 < len(one.points_m) < 450
-    # Each is the mean of its own points, and the square keeps its middle.
-    assert len(set(map(tuple, one.points_m.round(9)))) == len(one.points_m)
-    np.testing.assert_allclose(one.points_m[:, 2], 0.5)
-    np.testing.assert_allclose(one.points_m.mean(axis=0), square_m.mean(axis=0), atol=PITCH_M)
-    assert _from_border_m(one.points_m).min() >= -1e-12
-    np.testing.assert_array_equal(one.points_m, again.points_m)
-    np.testing.assert_array_equal(one.outline, again.outline)
-    assert one.spacing_m == pytest.approx(
-        PITCH_M * np.sqrt(len(square_m) / len(one.points_m)), rel=0.3
-    )
-
-
 def test_a_surface_wholly_beside_cuts_is_refused(square_m: Float64) -> None:
     with pytest.raises(HandError, match="beside cut edges"):
         describe_surface(square_m, np.ones(len(square_m), dtype=np.bool_), 500)

@@ -17,7 +17,6 @@ from handcal.register.verdict import (
     advise,
     describe_verified,
     eye_benefit,
-    eye_distance_m,
     judge,
 )
 from handcal.rig.example import HALF_EYE_DISTANCE_M, example_rig
@@ -230,21 +229,6 @@ def test_a_verdict_tells_what_the_wearer_moved_and_what_it_changed() -> None:
     assert "changed" not in kept.reason
 
 
-def test_a_drawing_set_aside_counts_as_moved_by_what_remained() -> None:
-    fused = _fused({"left": GOOD})
-    brought_back = Verification(
-        (0.002, -0.001, 0.003),
-        (-9.0, 1.0),
-        (0.002, -0.001, 0.003),
-        -0.02,
-        offset_arcmin=(10.0, 0.0),
-        offset_size=0.02,
-    )
-    found = describe_verified(RIG, fused, "left", brought_back)
-    assert found.moved_arcmin == pytest.approx(np.sqrt(2.0))
-    assert found.moved_size == pytest.approx(0.0)
-
-
 def test_what_no_eye_explains_is_said_and_never_accepted() -> None:
     good = _fused({"left": GOOD})
     assert _judge({"left": GOOD})["left"].name == "accept"
@@ -268,15 +252,6 @@ def test_evidence_from_outside_contradicts_the_best_result() -> None:
     assert {(verdict.name, verdict.reason) for verdict in verdicts.values()} == {
         ("contradicted", "The picture froze.")
     }
-
-
-def test_eye_distance() -> None:
-    apart_m = eye_distance_m(RIG, {"left": GOOD, "right": GOOD})
-    assert apart_m == pytest.approx(2 * HALF_EYE_DISTANCE_M, abs=1e-4)
-    moved = replace(GOOD, shift_m=GOOD.shift_m + np.array([0.002, 0.0, 0.0]))
-    apart_m = eye_distance_m(RIG, {"left": GOOD, "right": moved})
-    assert apart_m == pytest.approx(2 * HALF_EYE_DISTANCE_M + 0.002, abs=1e-4)
-    assert eye_distance_m(RIG, {"left": GOOD}) is None
 
 
 @pytest.mark.parametrize(

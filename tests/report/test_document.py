@@ -16,8 +16,15 @@ from handcal.report.cells import (
     rows_csv,
     signed,
 )
-from handcal.report.document import Figure, Report, Section, Table
-from handcal.report.provenance import at_minute, made_with, settings_items
+from handcal.report.document import (
+    Figure,
+    Report,
+    Section,
+    Table,
+    at_minute,
+    made_with,
+    settings_items,
+)
 from handcal.report.statistics import mean_interval, summarise
 
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 import csv
 import io
 from base64 import b64decode
-from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
-from handcal.core.errors import CancelledError, FileError
+from handcal.core.errors import FileError
 from handcal.core.progress import Progress
 from handcal.report.document import Column, Report, Section, Table
 from handcal.report.html import write_html
@@ -67,11 +66,6 @@ def test_all_is_said_in_order(page: Page) -> None:
     assert said[-1].startswith("handcal ")
 
 
-def test_contents_lead_to_sections(page: Page) -> None:
-    links = [value for value in page.values("a", "href") if value.startswith("#")]
-    assert links == [f"#{name}" for name in page.values("h2", "id")] == ["#s1", "#s2"]
-
-
 def test_figures_and_their_numbers_are_in_it(page: Page) -> None:
     for url in page.values("img", "src"):
         kind, content = url.split(",")
@@ -90,14 +84,6 @@ def test_it_needs_nothing_else(page: Page) -> None:
     assert all(value.startswith(("#", "data:")) for value in used)
     assert not {"script", "link", "iframe"} & {tag for tag, _, _ in page.attributes}
     assert any("default-src 'none'" in value for value in page.values("meta", "content"))
-
-
-def test_it_is_for_dark_screens_and_paper_too(page: Page) -> None:
-    style = next(text for text in page.texts if "@media" in text)
-    assert "@media (prefers-color-scheme: dark)" in style
-    assert "@media print" in style
-    assert "url(" not in style
-    assert "light dark" in page.values("meta", "content")
 
 
 def test_no_text_is_taken_for_html(tmp_path: Path) -> None:
@@ -119,18 +105,6 @@ def test_the_same_report_gives_the_same_bytes(tmp_path: Path, report: Report) ->
     for name in ("one", "two"):
         write_html(tmp_path / name, report, Progress())
     assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
-
-
-def test_giving_up_leaves_no_file(tmp_path: Path, report: Report) -> None:
-    def give_up(_what: str, _share: float) -> None:
-        raise CancelledError("enough")
-
-    with pytest.raises(CancelledError):
-        write_html(tmp_path / "x.html", report, Progress(give_up))
-    assert not list(tmp_path.iterdir())
-    write_html(
-        tmp_path / "x.html", replace(report, sections=[]), Progress(give_up)
-    )  # nothing to draw
 
 
 def test_a_link_in_place_of_the_figures_is_not_followed(tmp_path: Path, report: Report) -> None:

@@ -136,26 +136,6 @@ def test_a_table_takes_any_cell(cell: str) -> None:
         assert_in_order(page)
 
 
-def test_axes_have_their_place_between_the_margins() -> None:
-    document = Document("footer")
-    strip = Figure("strip", "", lambda _axes: None, [], height_mm=70.0, columns=2)
-    for _ in range(5):
-        for axes in document.axes(strip):
-            axes.plot([0.0, 1.0])
-    pages = document.finish()
-    assert [len(page.axes) for page in pages] == [6, 4]
-    for page in pages:
-        bounds = np.array([axes.get_position().extents for axes in page.axes])
-        assert (bounds > 0.05).all()
-        assert (bounds < 0.95).all()
-
-
-def test_pages_are_numbered() -> None:
-    document = Document("footer")
-    document.new_page()
-    assert lines(document.finish()) == ["footer", "1 / 2", "footer", "2 / 2"]
-
-
 def texts(page: Page) -> list[str]:
     return [text.get_text() for text in page.texts]
 

@@ -10,8 +10,7 @@ import pytest
 from handcal.core.errors import CancelledError, FileError
 from handcal.core.progress import Progress
 from handcal.report.document import Report
-from handcal.report.html import write_html
-from handcal.report.write import write_report
+from handcal.report.html import write_html, write_report
 
 
 def test_a_report_is_all_its_files(tmp_path: Path, report: Report) -> None:

@@ -6,13 +6,13 @@ import pytest
 
 from handcal.core.geometry import rigid
 from handcal.core.types import CameraIdentity, DepthCheck, Intrinsics
-from handcal.rig.assemble import with_display, with_stereo
 from handcal.rig.boards.views import ViewsError, WorstView
 from handcal.rig.displays.homography import DisplayCalibration, DisplayHomography
 from handcal.rig.example import example_rig
 from handcal.rig.lens.fit import CalibrationVerdict
 from handcal.rig.lens.stereo import StereoCalibration
 from handcal.rig.rig_file import read_rig, write_rig
+from handcal.rig.steps import with_display, with_stereo
 
 RIG = example_rig()
 MADE = "2026-11-21T16:00:00+00:00"

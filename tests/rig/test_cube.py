@@ -54,23 +54,6 @@ def test_a_face_looks_out_of_the_cube_and_is_not_mirrored(marker: int) -> None:
     np.testing.assert_allclose(T[:3, 3], -0.03 * T[:3, 2])
 
 
-def test_the_net_closes() -> None:
-    """Each side of the middle row is folded back from the one before it; top and bottom from it."""
-    T_front_right = np.linalg.inv(face_pose(CUBE, 0)) @ face_pose(CUBE, 1)
-    for left, right in ((0, 1), (1, 2), (2, 3), (3, 0)):
-        step = np.linalg.inv(face_pose(CUBE, left)) @ face_pose(CUBE, right)
-        np.testing.assert_allclose(step, T_front_right, atol=1e-12)
-    # The lower edge of the top, and the upper edge of the bottom, are the front's.
-    lower, upper = np.array([[0, 0.03, 0]]), np.array([[0, -0.03, 0]])
-    front = face_pose(CUBE, 0)
-    np.testing.assert_allclose(
-        transform(face_pose(CUBE, 4), lower), transform(front, upper), atol=1e-12
-    )
-    np.testing.assert_allclose(
-        transform(face_pose(CUBE, 5), upper), transform(front, lower), atol=1e-12
-    )
-
-
 def test_corners_are_found_to_a_fraction_of_a_pixel() -> None:
     found = find_cube(paint(), CUBE)
     assert list(found) == [0, 1, 4]
@@ -123,7 +106,6 @@ def test_corners_of_a_cube_with_other_faces_are_refused() -> None:
         ({"marker_m": 0.059}, "0.3 to 0.9"),
         ({"dictionary": "DICT_9X9"}, "unknown dictionary"),
         ({"ids": (0, 1, 2, 3, 4, 4)}, "six different"),
-        ({"ids": (0, 1, 2, 3, 4, 50)}, "of the 50"),
     ],
 )
 def test_a_cube_that_cannot_be_is_refused(wrong: dict[str, object], why: str) -> None:
@@ -140,11 +122,8 @@ def test_a_cube_comes_back(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("values", "why"),
     [
-        ({}, "handcal_cube must be 1"),
         ({"handcal_cube": 2}, "handcal_cube must be 1"),
         ({"handcal_cube": 1, "edge_m": 0.06}, "has no edge_m"),
-        ({"handcal_cube": 1, "side_m": "60"}, "side_m must be a finite number"),
-        ({"handcal_cube": 1, "ids": [0, 1]}, "a list of 6 values"),
         ({"handcal_cube": 1, "side_m": 60.0}, "10 mm and 1 m"),
     ],
 )

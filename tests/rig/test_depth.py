@@ -65,18 +65,6 @@ def test_the_uncertainty_is_that_of_repeated_checks() -> None:
     assert 0.4 < ratio < 1.6
 
 
-def test_flatness_grows_with_the_square_of_the_distance() -> None:
-    check = check_of(2, count=20)
-    assert check.ranges_m.shape == (3, 2)
-    np.testing.assert_allclose(check.ranges_m[:, 0], [0.2, 0.4, 0.6], atol=1e-12)
-    flatness_m = check.flatness_m
-    assert (np.diff(flatness_m) > 0).all()
-    # Noise of a stereo camera: z² σ / (f B), with f = 502 px, B = 55 mm, σ = 0.08 px and rounding.
-    expected_m = 0.5**2 * np.hypot(0.08, 1 / 32 / np.sqrt(12)) / (502 * 0.055)
-    assert flatness_m[1] == pytest.approx(expected_m, rel=0.25)
-    assert (check.flatness_sigma_m < 0.3 * flatness_m).all()
-
-
 def test_a_good_camera_raises_no_doubt_and_a_bias_of_10_mm_does() -> None:
     for seed in range(2):
         assert depth_finding(check_of(seed)).is_fine

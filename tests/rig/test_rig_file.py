@@ -71,35 +71,23 @@ def test_opencv_itself_reads_the_file(path: Path) -> None:
     [
         ("%YAML", "#", "not a YAML file as OpenCV and handcal write it"),
         ("handcal_rig: 3", "other: 3", "handcal_rig must be a whole number"),
-        ("name: ", "label: ", "name must be a text"),
         ("left:", "links:", "left must be a map"),
         ("      H0:", "      H1:", r"left\.model\.H0 must be a 3×3 opencv-matrix of type d"),
-        ("rows: 3", "rows: 2", r"left\.model\.K must be a 3×3"),
-        ("rows: 4", "rows: 3", r"left\.T_V_H must be a 4×4"),
         ("rows: 3", "rows: 1000000000", r"left\.model\.K must be a 3×3"),
-        ("dt: d", "dt: f", r"left\.T_V_H must be a 4×4 opencv-matrix of type d"),
-        ("2456.,", "", r"left\.model\.K must be a 3×3"),
         ("2456.,", "-2456.,", r"left\.K .* positive focal lengths"),
-        ("2456.,", ".nan,", r"left\.K .* finite"),
         ("z_C0_S_m: 2.", "z_C0_S_m: two", r"left\.model\.z_C0_S_m must be a number"),
-        ("   model:", "   modell:", r"left\.model must be a map"),
-        ('"homography"', "1", r"left\.model\.name must be a text"),
         (
             '"homography"',
             '"spline"',
             "the display model 'spline' is not known, only 'homography': ",
         ),
-        ('   model: ""', "   model: 1", r"depth_camera\.model must be a text"),
         (
             'serial_number: ""',
             'serial_number: "1\\t2"',
             r"depth_camera\.serial_number must be one l",
         ),
-        ("width_px: 1268", "width_px: 1268.5", r"left\.width_px must be a whole number"),
         ("width_px: 1280", "width_px: 0", "depth_camera: width_px"),
         ("distortion: []", "distortion: [ 0.1 ]", r"depth_camera\.distortion must hold"),
-        ("distortion: []", "distortion: [ a, b, c, d ]", r"depth_camera\.distortion must be a num"),
-        ("distortion: []", "distortion: 1.", r"depth_camera\.distortion must be a list"),
     ],
 )
 def test_a_bad_field_is_named(path: Path, old: str, new: str, problem: str) -> None:
@@ -220,29 +208,16 @@ def test_a_rig_of_which_everything_is_known_comes_back_exactly(path: Path) -> No
     [
         ('"817512071792"', "817512071792", r"depth_camera\.serial_number must be a text"),
         ('"0a1b2c"', '"0a1b2g"', r"headset\.device_id must be 1 to 128 hexadecimal digits"),
-        ('"0a1b2c"', '""', r"headset\.device_id must be 1 to 128"),
-        ("device_id", "device", r"headset\.device_id must be a text"),
         ("protocol: 2", "protocol: -2", r"headset\.protocol must lie between 0 and 65535"),
         ("eye_distance_m: 0.06", "eye_distance_m: 0.6", r"headset\.eye_distance_m must lie"),
         ("-0.5, 0.4", "0.5, 0.4", r"headset\.left\.tangents must be left, right, up and down"),
-        ("-0.5, 0.4", "-.inf, 0.4", r"headset\.left\.tangents must be left, right, up and down"),
-        ("tangents", "tangent", r"headset\.left\.tangents must be a 4×1"),
         ("scale: 1.002", "scale: 0.1", r"depth_check\.scale must lie"),
-        ("scale: 1.002", "scale: .nan", r"depth_check\.scale must lie"),
-        ("offset_m: -0.001", "offset_m: -10", r"depth_check\.offset_m must lie"),
         ("views: 12", "views: 0", r"depth_check\.views must be above 0"),
         (
             "rows: 2\n      cols: 4",
             "rows: 200\n      cols: 4",
             r"depth_check\.flatness must be a N×4",
         ),
-        (
-            "rows: 2\n      cols: 4",
-            "rows: 0\n      cols: 4",
-            r"depth_check\.flatness must be a N×4",
-        ),
-        ("rows: 2\n      cols: 4", "rows: 1.5\n      cols: 4", r"flatness must be a N×4"),
-        ("flatness:", "flat:", r"depth_check\.flatness must be a N×4"),
     ],
 )
 def test_a_bad_field_of_what_may_be_known_is_named(
@@ -259,12 +234,9 @@ def test_a_bad_field_of_what_may_be_known_is_named(
 @pytest.mark.parametrize(
     ("changes", "problem"),
     [
-        ({"ranges_m": CHECK.ranges_m[::-1]}, "1 to 20 ranges of depth, ascending"),
         ({"ranges_m": -CHECK.ranges_m[::-1, ::-1]}, "1 to 20 ranges of depth, ascending"),
         ({"flatness_m": np.array([0.001, -0.001])}, "flatness must be at least 0 and below 1"),
-        ({"flatness_sigma_m": np.array([0.001, np.nan])}, "and so its σ"),
         ({"covariance": np.array([[1.0, 0.0], [0.5, 1.0]])}, "must be finite and symmetric"),
-        ({"made": ""}, r"depth_check\.made must be one line"),
     ],
 )
 def test_an_implausible_depth_check_is_not_written(
@@ -279,11 +251,9 @@ def test_an_implausible_depth_check_is_not_written(
     ("changes", "problem"),
     [
         ({"views": 0}, r"origins\.left\.views must be above 0"),
-        ({"rms_px": np.nan}, r"origins\.left\.rms_px must be a number"),
         ({"reason": "two\nlines"}, r"origins\.left\.reason must be one line"),
         ({"parameters": (), "covariance": np.empty((0, 0))}, "parameters must hold 1 to"),
         ({"covariance": [[-1.0]]}, "variances that are not negative"),
-        ({"covariance": [[np.inf]]}, r"origins\.left\.covariance must be finite"),
     ],
 )
 def test_an_implausible_origin_is_named(

@@ -34,7 +34,6 @@ from handcal.lab.study.trials import floor_error_m, solve_trial
 from handcal.register.guard import GuardSettings
 from handcal.register.solve import solve_alignment
 from handcal.report.statistics import MeanInterval, mean_interval
-from handcal.rig.assemble import screen_of, with_display, with_stereo
 from handcal.rig.boards.board import Board
 from handcal.rig.boards.views import BoardImage, board_image
 from handcal.rig.displays.grid import Grid, GridView, draw_grid, find_grid
@@ -50,6 +49,7 @@ from handcal.rig.example import FOCAL_PX, Z_E_S_M, example_rig
 from handcal.rig.lens.camera import calibrate_camera
 from handcal.rig.lens.stereo import calibrate_stereo
 from handcal.rig.lens.viewpoint import viewpoint_from_stereo
+from handcal.rig.steps import screen_of, with_display, with_stereo
 from handcal.sim.alignments import AlignmentSettings
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 from handcal.sim.overlay import overlay_by_eye

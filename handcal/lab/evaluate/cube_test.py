@@ -29,8 +29,17 @@ from handcal.lab.methods import MISALIGNMENT
 from handcal.lab.settings import CubeTestSettings, output_folder
 from handcal.lab.study.store import free_of_studies
 from handcal.report.cells import interval_ends, mean_sd
-from handcal.report.document import Column, Figure, Report, Section, Table, facts
-from handcal.report.provenance import made_with, settings_items
+from handcal.report.document import (
+    Column,
+    Figure,
+    Report,
+    Section,
+    Table,
+    facts,
+    made_with,
+    settings_items,
+)
+from handcal.report.html import write_report
 from handcal.report.statistics import (
     INTERVAL_METHOD,
     MeanInterval,
@@ -38,7 +47,6 @@ from handcal.report.statistics import (
     mean_interval,
     summarise,
 )
-from handcal.report.write import write_report
 from handcal.rig.boards.board import BoardError
 from handcal.rig.boards.views import ViewsError
 from handcal.rig.cube import (

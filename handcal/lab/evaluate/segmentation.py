@@ -31,9 +31,8 @@ from handcal.lab.evaluate.masked_frames import (
 )
 from handcal.lab.settings import SegmentationTestSettings, output_folder
 from handcal.lab.study.store import free_of_studies
-from handcal.report.document import Column, Figure, Report, Section, Table, facts
-from handcal.report.provenance import made_with
-from handcal.report.write import write_report
+from handcal.report.document import Column, Figure, Report, Section, Table, facts, made_with
+from handcal.report.html import write_report
 
 Find = Callable[[Frame], HandCloud]
 """Segments the hand in a frame that stands alone; raises HandError if it finds none."""

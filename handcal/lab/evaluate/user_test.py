@@ -27,9 +27,20 @@ from handcal.lab.methods import REPROJECTION
 from handcal.lab.settings import UserTestSettings, output_folder
 from handcal.lab.study.store import free_of_studies
 from handcal.report.cells import extremes, interval_ends, mean_sd, median_quartiles
-from handcal.report.document import Column, Figure, FigureRow, Item, Report, Section, Table, facts
+from handcal.report.document import (
+    Column,
+    Figure,
+    FigureRow,
+    Item,
+    Report,
+    Section,
+    Table,
+    at_minute,
+    facts,
+    made_with,
+)
+from handcal.report.html import write_report
 from handcal.report.page import families, plain
-from handcal.report.provenance import at_minute, made_with
 from handcal.report.statistics import (
     INTERVAL_METHOD,
     MeanInterval,
@@ -39,7 +50,6 @@ from handcal.report.statistics import (
     summarise,
     variance_components,
 )
-from handcal.report.write import write_report
 from handcal.session.journal import JOURNAL, MAX_JOURNAL_BYTES
 from handcal.session.record import replay
 from handcal.session.session import Session, SessionRecord

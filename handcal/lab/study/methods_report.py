@@ -17,8 +17,16 @@ from handcal.export.figures import COLORS, name_axes
 from handcal.lab.methods import MISALIGNMENT, REPROJECTION
 from handcal.lab.study.methods import HANDCAL_BOTH, HANDCAL_EACH, PAPER, MethodSettings
 from handcal.lab.study.store import StudyRow
-from handcal.report.document import Column, Figure, Report, Section, Table, facts
-from handcal.report.provenance import made_with, settings_items
+from handcal.report.document import (
+    Column,
+    Figure,
+    Report,
+    Section,
+    Table,
+    facts,
+    made_with,
+    settings_items,
+)
 from handcal.report.statistics import mean_interval, summarise
 from handcal.rig.example import example_rig
 

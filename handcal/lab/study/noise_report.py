@@ -16,8 +16,17 @@ from handcal.export.figures import name_axes
 from handcal.lab.study.noise import ERRORS_MM, FLOOR, HANDS, SECTIONS, NoiseSettings
 from handcal.lab.study.store import StudyRow
 from handcal.lab.study.trials import BEST_ITERATE
-from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
-from handcal.report.provenance import made_with, settings_items
+from handcal.report.document import (
+    Column,
+    Figure,
+    Item,
+    Report,
+    Section,
+    Table,
+    facts,
+    made_with,
+    settings_items,
+)
 from handcal.report.statistics import INTERVAL_METHOD, MeanInterval, mean_interval
 
 LINE_MM = 4.0

@@ -38,7 +38,7 @@ from handcal.lab.study.run import Study, resumable, run_study
 from handcal.lab.study.store import StudyRow
 from handcal.lab.study.trials import BEST_ITERATE
 from handcal.report.document import Report
-from handcal.report.write import write_report
+from handcal.report.html import write_report
 from handcal.sim.people import Variant
 
 _OTHERS = 2_000_003

@@ -68,8 +68,8 @@ class ViewSelector:
         settings = self._settings
         first, before = seen[0], self._before
         self._before = first
-        found = [one for one in seen if one is not None]
-        if first is None or len(found) < len(seen):
+        views = [one for one in seen if one is not None]
+        if first is None or len(views) < len(seen):
             cameras = zip(self._cameras, seen, strict=False)
             blind = " and the ".join(name for name, one in cameras if one is None)
             by = f" by the {blind}" if blind else ""
@@ -77,7 +77,7 @@ class ViewSelector:
         rest_share = settings.rest_share
         if rest_share is not None and (before is None or _moved_share(before, first) > rest_share):
             return "the board moves: hold it still for a moment"
-        if max(one.blur_px for one in found) > _MOST_BLUR_PX:
+        if max(one.blur_px for one in views) > _MOST_BLUR_PX:
             return "the image is blurred: hold the board still, and see to focus and light"
         if any(_moved_share(one, first) < settings.apart_share for one in self._kept):
             return "the board was seen like this before: tilt it, or move it elsewhere"

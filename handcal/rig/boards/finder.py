@@ -66,8 +66,10 @@ def find_board(image: UInt8, board: Board, *, explain: bool = True) -> BoardView
     ids, pixels = ids[fits], pixels[fits]
     if board.kind == "checkerboard" and fits.all() and _goes_on(gray, pixels, board):
         columns, rows = board.squares
+        if markers := why_not_plain(gray):
+            raise BoardError(markers)
         goes_on = f"the checkerboard continues: it has more squares than {columns}×{rows}"
-        raise BoardError(why_not_plain(gray) or f"{goes_on}; {OTHER_BOARD}")
+        raise BoardError(goes_on, OTHER_BOARD)
     pixels = _refine(gray, pixels, board)
     return BoardView(
         points_m=corners_m(board)[ids],

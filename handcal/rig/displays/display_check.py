@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 
 from handcal.core.display import projection_matrix
+from handcal.core.errors import HandcalError
 from handcal.core.geometry import project
 from handcal.core.types import Eye, Float64, Projection, Rig, UInt8
 from handcal.link.shapes import Target
@@ -44,8 +45,8 @@ class Display:
     target: Target | None
 
 
-class UnseenError(Exception):
-    """The camera does not see what it must; the text says what, with advice."""
+class UnseenError(HandcalError):
+    """The camera does not see what it must."""
 
 
 def displays(rig: Rig, eye: Eye, rig_name: str) -> dict[Shown, Display]:
@@ -128,8 +129,8 @@ def find_square(dark: tuple[UInt8, UInt8], seen: UInt8) -> tuple[Float64, int]:
     mask = np.abs(added) > max(_LEAST_CONTRAST, _NOISES * noise)
     if np.count_nonzero(mask) < _LEAST_PIXELS:
         raise UnseenError(
-            "the camera does not see the square that the headset draws; darken the room, and put "
-            "the camera behind this eye's display"
+            "the camera does not see the square that the headset draws",
+            "darken the room, and put the camera behind this eye's display",
         )
     y, x = np.nonzero(mask)
     weights = np.abs(added[mask])
@@ -153,8 +154,8 @@ def shares_seen(found: Mapping[Shown, tuple[Float64, int]]) -> dict[Probe, float
     pixels = [count for _, count in found.values()]
     if max(pixels) > _AREA_RATIO * min(pixels):
         raise UnseenError(
-            "something other than the square moved or lit up, or the square left the picture; keep "
-            "the camera and everything in front of it still, and check again"
+            "something other than the square moved or lit up, or the square left the picture",
+            "keep the camera and everything in front of it still, and check again",
         )
     control = found["control"][0] - found["rest"][0]
     length = float(control @ control)

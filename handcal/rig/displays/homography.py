@@ -25,6 +25,7 @@ from handcal.core.types import EyeDisplay, Float64, Intrinsics, UInt8
 from handcal.rig.boards.views import ViewsError, require_size
 from handcal.rig.displays.grid import GridView
 from handcal.rig.lens.fit import CalibrationVerdict, clustered_covariance, rms
+from handcal.rig.lens.lens import undistort
 from handcal.rig.lens.viewpoint import ViewpointPose, plane_pose
 from handcal.rig.plausible import MAX_DEVICE_SIDE_PX
 
@@ -232,19 +233,6 @@ def pose_before(
     points_px = np.column_stack([corners_px, np.zeros(4)])
     T_S_C = invert(plane_pose(points_px, seen_px, undistorted))
     return T_S_C[:3, :3], T_S_C[:3, 3]
-
-
-def undistort(pixels: Float64, camera: Intrinsics) -> Float64:
-    """Return pixels (N, 2) of a camera with the lens distortion removed."""
-    K = camera_matrix(camera)
-    straight = cv2.undistortPoints(
-        pixels[:, None],
-        K,
-        np.array(camera.distortion),
-        P=K,
-        criteria=(cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-9),
-    )
-    return np.asarray(straight, dtype=np.float64).reshape(-1, 2)
 
 
 def _corner_sigma_px(

@@ -198,6 +198,7 @@ class Problem:
             found.append(rows)
             if not len(rows):
                 continue
+            # Board to first camera to second camera; the chain rule goes back the same way.
             of_boards = R[: len(boards)].swapaxes(1, 2)
             on_board_m = corners.points_m + corners.modes_m @ setup.shape[: self._shape]
             turned_m = corners.of_frames(on_board_m, of_boards)

@@ -173,14 +173,14 @@ def best_lens(fits: Sequence[LensFit]) -> LensFit:
     image's edge: their coefficients are not determined where the board was not seen. A fisheye is
     taken if no pinhole remains, because not everything can use one.
     """
-    least_px = min(one.held_out_px for one in fits)
-    near = [one for one in fits if one.held_out_px <= _NEAR * least_px]
-    edge_px = min(one.edge_px for one in near)
-    known = [one for one in near if one.edge_px <= _UNCERTAIN * edge_px] or near
-    known = [one for one in known if one.lens != "fisheye"] or known
-    least = min(known, key=lambda one: one.held_out_px)
-    as_good = [one for one in known if one is least or not _is_worse(one, least)]
-    return min(as_good, key=lambda one: _COMPARED.index(one.lens))
+    least_px = min(fit.held_out_px for fit in fits)
+    near = [fit for fit in fits if fit.held_out_px <= _NEAR * least_px]
+    edge_px = min(fit.edge_px for fit in near)
+    known = [fit for fit in near if fit.edge_px <= _UNCERTAIN * edge_px] or near
+    known = [fit for fit in known if fit.lens != "fisheye"] or known
+    least = min(known, key=lambda fit: fit.held_out_px)
+    as_good = [fit for fit in known if fit is least or not _is_worse(fit, least)]
+    return min(as_good, key=lambda fit: _COMPARED.index(fit.lens))
 
 
 def _is_worse(one: LensFit, least: LensFit) -> bool:

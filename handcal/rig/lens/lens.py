@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from handcal.core.errors import HandcalError
-from handcal.core.geometry import rigid
+from handcal.core.geometry import camera_matrix, rigid
 from handcal.core.types import Float64, Intrinsics
 from handcal.rig.boards.board import BoardView
 
@@ -152,6 +152,19 @@ def to_plane(pixels: Float64, camera: Camera) -> Float64:
     undistort = cv2.fisheye if isinstance(camera, FisheyeIntrinsics) else cv2
     plane = undistort.undistortPoints(pixels[:, None], K, coefficients, criteria=criteria)
     return np.asarray(plane, np.float64).reshape(-1, 2)
+
+
+def undistort(pixels: Float64, camera: Intrinsics) -> Float64:
+    """Return pixels (N, 2) of a camera with the lens distortion removed."""
+    K = camera_matrix(camera)
+    straight = cv2.undistortPoints(
+        pixels[:, None],
+        K,
+        np.array(camera.distortion),
+        P=K,
+        criteria=(cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-9),
+    )
+    return np.asarray(straight, dtype=np.float64).reshape(-1, 2)
 
 
 def first_pose(seen: BoardView, camera: Camera) -> Float64 | None:

@@ -193,7 +193,7 @@ def _solved(views: Sequence[BoardImage], which: str, lens: LensChoice) -> Camera
     try:
         calibration = calibrate_camera(views, lens)
     except ViewsError as error:
-        raise ViewsError(f"{which} camera: {error}") from error
+        raise ViewsError(f"{which} camera: {error.what}", error.advice) from error
     if calibration.verdict.name == "bad":
         raise ViewsError(f"{which} camera: {calibration.verdict.reason}")
     return calibration

@@ -15,7 +15,7 @@ from handcal.lab.evaluate.user_test import UserTestRun
 from handcal.lab.settings import NoiseStudySettings
 from handcal.lab.study.run import run_study
 from handcal.report.document import Report
-from handcal.report.write import write_report
+from handcal.report.html import write_report
 from handcal_gui.evaluate.entries import UserEntries
 from handcal_gui.evaluate.work import FileEvaluation
 

@@ -5,8 +5,8 @@ import numpy as np
 
 from handcal.core.geometry import rigid
 from handcal.core.types import Origin
-from handcal.rig.assemble import STEREO_PARAMETERS
 from handcal.rig.example import example_rig
+from handcal.rig.steps import STEREO_PARAMETERS
 from handcal_gui.rig.rows import difference_rows, rig_rows
 
 SIGMAS = np.array([1e-3, 2e-3, 3e-3, 1e-4, 2e-4, 3e-4])

@@ -17,7 +17,6 @@ from handcal.core.display import view_of_eye
 from handcal.core.errors import HandcalError
 from handcal.core.geometry import invert, rigid
 from handcal.io.files import write_json
-from handcal.rig.assemble import screen_of
 from handcal.rig.boards.views import ViewsError, WorstView
 from handcal.rig.displays.grid import grid_on
 from handcal.rig.example import example_rig
@@ -31,6 +30,7 @@ from handcal.rig.formats import (
 from handcal.rig.lens.fit import CalibrationVerdict
 from handcal.rig.lens.stereo import StereoCalibration
 from handcal.rig.rig_file import read_rig, write_rig
+from handcal.rig.steps import screen_of
 from handcal.sim.photographs import BOARD
 from handcal_gui.rig.project_folder import DisplayEntries
 from handcal_gui.rig.shots import Shot, look
@@ -199,7 +199,7 @@ def test_command_and_wizard_write_the_same_bytes(
         def now(cls, tz: tzinfo | None = None) -> Self:
             return cls(2026, 1, 1, 12, tzinfo=tz)
 
-    monkeypatch.setattr("handcal.rig.assemble.datetime", AtNoon)
+    monkeypatch.setattr("handcal.rig.steps.datetime", AtNoon)
     rig = tmp_path / "rig.yaml"
     write_rig(rig, RIG)
     commanded, entered = tmp_path / "commanded.yaml", tmp_path / "entered.yaml"

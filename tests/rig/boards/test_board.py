@@ -100,14 +100,8 @@ def _mostly_covered() -> UInt8:
             Board(kind="checkerboard", squares=(8, 7)),
             "continues|is seen, not one of 8×7",
         ),
-        (
-            draw_board(CHECKERBOARD, SQUARE_PX),
-            Board(kind="checkerboard", squares=(12, 9)),
-            "10×7 squares is seen, not one of 12×9",
-        ),
         (_mostly_covered(), CHARUCO, "only .* markers|too few corners"),
         (np.full((480, 640), 20, np.uint8), CHARUCO, "too dark"),
-        (np.full((480, 640), 250, np.uint8), CHARUCO, "too bright"),
         (np.full((480, 640), 128, np.uint8), CHARUCO, "no contrast"),
     ],
 )
@@ -122,7 +116,6 @@ def test_what_is_wrong_with_an_image_is_named_with_what_to_do(
     ("fields", "said"),
     [
         ({"squares": (2, 7)}, "3 to 40 squares"),
-        ({"squares": (41, 7)}, "3 to 40 squares"),
         ({"square_m": 0.0}, "between 1 mm and 1 m"),
         ({"marker_m": 0.025}, "0.3 to 0.95"),
         ({"dictionary": "DICT_9X9"}, "unknown dictionary DICT_9X9"),

@@ -47,21 +47,6 @@ def test_what_is_not_kept_is_explained(moment: list[BoardView | None], why: str)
     assert why in selector.consider(moment)
 
 
-@pytest.mark.parametrize(
-    ("moment", "by"),
-    [
-        ([None, seen()], " by the depth camera"),
-        ([seen(), None], " by the headset camera"),
-        ([None, None], " by the depth camera and the headset camera"),
-    ],
-)
-def test_the_cameras_that_do_not_see_the_board_are_named(
-    moment: list[BoardView | None], by: str
-) -> None:
-    selector = ViewSelector(cameras=["depth camera", "headset camera"])
-    assert selector.consider(moment).startswith(f"the board is not seen{by}: bring it")
-
-
 def test_other_corners_of_the_board_are_another_view() -> None:
     selector = ViewSelector()
     for part in (slice(0, 20), slice(30, 54)):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from handcal.core.types import Float64
-from handcal.rig.displays.gray_code import held_out_arcmin
+from handcal.rig.displays.grid import _arcmin, _terms, held_out_arcmin
 
 # fx, fy, cx, cy of the undistorted maps, from cameraCalibration.json.
 CAMERAS = {"left": (285.05, 286.14, 425.86, 409.55), "right": (284.03, 285.05, 423.17, 401.85)}
@@ -36,19 +36,6 @@ def _pairs(folder: Path, name: str, eye: str) -> tuple[Float64, Float64]:
         keep = off < 6 * np.median(off) + 1
         display, rays = display[keep], rays[keep]
     return display, rays
-
-
-def _terms(display: Float64, degree: int) -> Float64:
-    x, y = (2 * display - 1).T
-    powers = [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]
-    return np.stack([x**i * y**j for i, j in powers], axis=1)
-
-
-def _arcmin(a: Float64, b: Float64) -> Float64:
-    a, b = (np.column_stack([rays, np.ones(len(rays))]) for rays in (a, b))
-    sines = np.linalg.norm(np.cross(a, b), axis=1)
-    off: Float64 = np.degrees(np.arctan2(sines, np.sum(a * b, axis=1))) * 60
-    return off
 
 
 def _by_homography(source: Float64, target: Float64, at: Float64) -> Float64:
