@@ -10,6 +10,7 @@ from handcal.core.errors import PosePendingError
 from handcal.core.geometry import rigid
 from handcal.core.types import EYES, Eye, HeadsetIdentity, HeadsetView, Projection
 from handcal.link import client as client_module
+from handcal.link import messages
 from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.fields import MalformedError, read_text
 from handcal.link.impair import Impairment
@@ -275,6 +276,19 @@ def test_an_outline_arrives_in_order_for_its_eyes(
     assert state.is_outline
     assert state.live_eyes == ("left",)
     np.testing.assert_allclose(state.live_W_m, outline, atol=1e-4)
+
+
+def test_an_outline_with_a_missing_chunk_is_points(
+    server: HeadsetServer, pairing_key: bytes
+) -> None:
+    whole = messages.live_hand(hand(count=650), False, 10**6, is_outline=True)
+    assert len(whole) > 2
+    with HeadsetClient(server.address, pairing_key, IDENTITY) as client:
+        server.wait_connected(5.0)
+        with server._changed:
+            server._stream.extend(whole[1:])
+        eventually(lambda: client.state().live_W_m is not None)
+        assert not client.state().is_outline
 
 
 @pytest.mark.parametrize("step_s", [-0.3, 0.3])
