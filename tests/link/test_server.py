@@ -18,7 +18,7 @@ from handcal.link import handcal_pb2 as pb
 from handcal.link import messages
 from handcal.link.pairing import Pairings
 from handcal.link.reliable import Receipt
-from handcal.link.server import HeadsetServer
+from handcal.link.server import Confirmation, HeadsetServer
 from tests.helpers import eventually
 
 NewHeadset = Callable[..., Any]
@@ -195,23 +195,54 @@ def test_a_paired_headset_gone_mad_stops_nothing(
     assert server.statistics().received > 100
 
 
+OFFSET_NS = 7_000_000_000
+
+
+def answer_ping(headset: Any, session: int, sequence: int) -> None:
+    """Answer the next ping, on a clock that is `OFFSET_NS` ahead."""
+    while not (envelope := headset.receive()[0]).HasField("ping"):
+        pass
+    now_ns = time.monotonic_ns() + OFFSET_NS
+    pong = pb.Pong(
+        t_sent_host_ns=envelope.ping.t_sent_host_ns,
+        t_received_headset_ns=now_ns,
+        t_sent_headset_ns=now_ns,
+        highest_sequence=10,
+        accepted=7,
+    )
+    headset.send(headset.seal(pb.Envelope(pong=pong), session, sequence))
+
+
+def test_a_confirmation_waits_for_a_ping_that_was_sent_after_it(
+    server: HeadsetServer, new_headset: NewHeadset
+) -> None:
+    """Only then is it known that the headset's clock was not set in between."""
+    headset = new_headset()
+    session = headset.join()
+    for sequence in range(1, 8):
+        answer_ping(headset, session, sequence)
+    eventually(lambda: server.statistics().received == 7)
+    confirm = messages.confirm(time.monotonic_ns() + OFFSET_NS, 1, bytes(16))
+    headset.send(headset.seal(confirm, session, 8))
+    eventually(lambda: server.statistics().received == 8)
+    assert server.confirmations() == []
+    heard: list[Confirmation] = []
+    for sequence in range(9, 30):
+        answer_ping(headset, session, sequence)
+        heard += server.confirmations()
+    (confirmation,) = heard
+    assert confirmation.is_timed
+
+
 def test_poses_are_told_at_the_hosts_time(server: HeadsetServer, new_headset: NewHeadset) -> None:
     headset = new_headset()
     session = headset.join()
-    offset_ns = 7_000_000_000
+    offset_ns = OFFSET_NS
     headset.send(headset.seal(KEEP_ALIVE, session, 1))
     with pytest.raises(PosePendingError, match="clock"):
         server.pose_at_host_ns(time.monotonic_ns())
     for sequence in range(2, 9):
-        t_ns = headset.receive()[0].ping.t_sent_host_ns + offset_ns
-        pong = pb.Pong(
-            t_sent_host_ns=t_ns - offset_ns,
-            t_received_headset_ns=time.monotonic_ns() + offset_ns,
-            t_sent_headset_ns=time.monotonic_ns() + offset_ns,
-            highest_sequence=10,
-            accepted=7,
-        )
-        headset.send(headset.seal(pb.Envelope(pong=pong), session, sequence))
+        answer_ping(headset, session, sequence)
     eventually(lambda: server.statistics().clock_offset_ms is not None)
     statistics = server.statistics()
     assert statistics.clock_offset_ms == pytest.approx(7000.0, abs=2.0)
