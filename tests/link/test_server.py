@@ -1,6 +1,5 @@
 """The PC's end against hand-made headsets, honest and hostile."""
 
-import random
 import threading
 import time
 from collections.abc import Callable
@@ -13,11 +12,10 @@ import pytest
 
 from handcal.core.errors import LinkError, PosePendingError
 from handcal.core.geometry import rigid
-from handcal.core.types import HeadsetIdentity, Projection
+from handcal.core.types import Projection
 from handcal.link import handcal_pb2 as pb
 from handcal.link import messages
 from handcal.link.pairing import Pairings
-from handcal.link.reliable import Receipt
 from handcal.link.server import Confirmation, HeadsetServer
 from tests.helpers import eventually
 
@@ -160,39 +158,6 @@ def test_nonsense_from_a_paired_headset_is_corrupt(
     headset.send(headset.greeting(KEEP_ALIVE))  # outside any session
     eventually(lambda: server.statistics().rejected["corrupt"] == 4)
     assert server.statistics().pose_rate_hz == 0.0
-
-
-def test_a_paired_headset_gone_mad_stops_nothing(
-    server: HeadsetServer, new_headset: NewHeadset
-) -> None:
-    headset, chance = new_headset(), random.Random(0)
-    session = headset.join()
-    extremes = (-(2**63), -1, 0, 1, 2**63 - 1)
-    for sequence in range(1, 400):
-        now_ns, a, b = time.monotonic_ns(), chance.choice(extremes), chance.choice(extremes)
-        envelope = chance.choice(
-            [
-                pb.Envelope(pong=pb.Pong(t_sent_host_ns=a, t_received_headset_ns=b)),
-                pb.Envelope(pong=pb.Pong(t_sent_host_ns=now_ns, t_received_headset_ns=b)),
-                pose(a),
-                messages.ack([Receipt(1, 1, 2**200)]),
-                messages.confirm(a, 1, bytes(16)),
-                messages.device(HeadsetIdentity("0" * 16), messages.Owner()),
-            ]
-        )
-        payload = bytearray(envelope.SerializeToString())
-        if chance.random() < 0.5:
-            payload[chance.randrange(len(payload))] ^= 1 << chance.randrange(8)
-        headset.send(headset.seal_payload(bytes(payload), session, sequence))
-
-    def taken() -> int:
-        statistics = server.statistics()
-        return statistics.received + statistics.rejected["wrong_session"]  # after a good-bye
-
-    eventually(lambda: taken() == 399)
-    server.confirmations()
-    assert server.statistics().rejected["corrupt"] > 0
-    assert server.statistics().received > 100
 
 
 OFFSET_NS = 7_000_000_000
