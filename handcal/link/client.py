@@ -330,7 +330,7 @@ class HeadsetClient(Endpoint):
         owner = Owner(projection.wearer, projection.rig)
         previous = self._state.owner
         projections = {**self._kept.pop(owner, {}), projection.eye: projection}
-        self._kept = {one: kept for one, kept in self._kept.items() if one.rig == owner.rig}
+        self._kept = {who: kept for who, kept in self._kept.items() if who.rig == owner.rig}
         while len(self._kept) >= MAX_WEARERS:
             del self._kept[next(iter(self._kept))]
         self._kept[owner] = projections
