@@ -1,4 +1,4 @@
-"""The final calibration in the files of single tools: Unity, OpenXR and 3D Slicer.
+"""The calibration in files for other programs: OpenCV, JSON, Unity, OpenXR and 3D Slicer.
 
 docs/export.md describes every file and how the tool reads it.
 """
@@ -33,6 +33,7 @@ from handcal.io.files import make_folder, write_atomic, write_json
 from handcal.rig.rig_file import quoted
 
 _VERSION = 1
+CALIBRATION_VERSION = 1
 
 
 def write_unity(path: Path, outcome: SessionOutcome, near_m: float, far_m: float) -> None:
@@ -110,10 +111,10 @@ def openxr_values(outcome: SessionOutcome) -> dict[str, object]:
     }
 
 
-def _pose_fields(one: Pose) -> dict[str, dict[str, float]]:
+def _pose_fields(pose_H: Pose) -> dict[str, dict[str, float]]:
     return {
-        "orientation": dict(zip("xyzw", one.quaternion_xyzw.tolist(), strict=True)),
-        "position": dict(zip("xyz", one.position_m.tolist(), strict=True)),
+        "orientation": dict(zip("xyzw", pose_H.quaternion_xyzw.tolist(), strict=True)),
+        "position": dict(zip("xyz", pose_H.position_m.tolist(), strict=True)),
     }
 
 
@@ -171,9 +172,6 @@ def _write_vtk(path: Path, points_m: Float64) -> None:
     middle = f"\nVERTICES {count} {2 * count}\n"
     data = head.encode() + points_mm.tobytes() + middle.encode() + cells.tobytes() + b"\n"
     write_atomic(path, data)
-
-
-CALIBRATION_VERSION = 1
 
 
 def write_calibration_yaml(path: Path, outcome: SessionOutcome) -> None:
