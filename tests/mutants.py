@@ -87,7 +87,7 @@ MUTANTS = (
     Mutant(
         "old hellos accepted",
         "handcal/link/handshake.py",
-        "if hello.time_ns <= heard.admitted_ns:",
+        "if greeting.time_ns <= heard.admitted_ns:",
         "if False:",
         "tests/link/test_handshake.py",
     ),

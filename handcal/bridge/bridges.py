@@ -1,4 +1,7 @@
-"""The bridges that run beside one calibration."""
+"""Bridges: they pass a station's snapshots on to other programs, each in its own thread.
+
+Each program's output is a module of its own, as each needs a package that may be missing.
+"""
 
 from __future__ import annotations
 

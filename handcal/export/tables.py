@@ -196,16 +196,16 @@ def _registered(shift: EyeShift) -> dict[str, Any]:
 
 
 def _comparison_rows(comparisons: Sequence[Comparison]) -> Iterator[dict[str, Any]]:
-    for number, one in enumerate(comparisons, 1):
+    for number, comparison in enumerate(comparisons, 1):
         yield {
             "comparison": number,
-            "time_utc": one.time,
-            "first": one.first,
-            "answer": one.answer,
-            "better": one.better or "neither",
+            "time_utc": comparison.time,
+            "first": comparison.first,
+            "answer": comparison.answer,
+            "better": comparison.better or "neither",
             **{
                 name: value
-                for eye, shift_m in one.applied_shift_m.items()
+                for eye, shift_m in comparison.applied_shift_m.items()
                 for name, value in _triple(f"{eye}_phi{{}}_mm", 1e3 * shift_m).items()
             },
         }

@@ -1,4 +1,4 @@
-"""The final calibration in the files of single tools: Unity, OpenXR and 3D Slicer.
+"""The calibration in files for other programs: OpenCV, JSON, Unity, OpenXR and 3D Slicer.
 
 docs/export.md describes every file and how the tool reads it.
 """
@@ -34,6 +34,7 @@ from handcal.rig.rig_file import quoted
 from handcal.session.drawn import ShiftKind
 
 _VERSION = 1
+CALIBRATION_VERSION = 1
 
 
 def write_unity(path: Path, outcome: SessionOutcome, near_m: float, far_m: float) -> None:
@@ -113,10 +114,10 @@ def openxr_values(outcome: SessionOutcome) -> dict[str, object]:
     }
 
 
-def _pose_fields(one: Pose) -> dict[str, dict[str, float]]:
+def _pose_fields(pose_H: Pose) -> dict[str, dict[str, float]]:
     return {
-        "orientation": dict(zip("xyzw", one.quaternion_xyzw.tolist(), strict=True)),
-        "position": dict(zip("xyz", one.position_m.tolist(), strict=True)),
+        "orientation": dict(zip("xyzw", pose_H.quaternion_xyzw.tolist(), strict=True)),
+        "position": dict(zip("xyz", pose_H.position_m.tolist(), strict=True)),
     }
 
 
@@ -174,9 +175,6 @@ def _write_vtk(path: Path, points_m: Float64) -> None:
     middle = f"\nVERTICES {count} {2 * count}\n"
     data = head.encode() + points_mm.tobytes() + middle.encode() + cells.tobytes() + b"\n"
     write_atomic(path, data)
-
-
-CALIBRATION_VERSION = 1
 
 
 def write_calibration_yaml(path: Path, outcome: SessionOutcome) -> None:

@@ -47,7 +47,7 @@ class HeadsetState:
     live_eyes: tuple[Eye, ...] = EYES
     """The eyes that draw the live hand."""
     is_outline: bool = False
-    """True if `live_W_m` is the closed outline of the hand, point by point."""
+    """True if `live_W_m` is the closed outline of the hand, point by point, none missing."""
     is_over_limit: bool = False
     """True if the live hand is rotated too far; the headset then draws it red."""
     prompt: str = ""
@@ -237,7 +237,9 @@ class HeadsetClient(Endpoint):
             if self._channel is None or self._is_silent(self._channel):
                 # Nothing that the PC cannot take away again.
                 return HeadsetState(projections=self._state.projections)
-            return replace(self._state, live_W_m=self._live_hand())
+            live_W_m, is_whole = self._live_hand()
+            is_outline = self._state.is_outline and is_whole
+            return replace(self._state, live_W_m=live_W_m, is_outline=is_outline)
 
     def _silence(self, timeout_s: float) -> LinkError:
         return self._refused or super()._silence(timeout_s)
@@ -328,7 +330,7 @@ class HeadsetClient(Endpoint):
         owner = Owner(projection.wearer, projection.rig)
         previous = self._state.owner
         projections = {**self._kept.pop(owner, {}), projection.eye: projection}
-        self._kept = {one: kept for one, kept in self._kept.items() if one.rig == owner.rig}
+        self._kept = {who: kept for who, kept in self._kept.items() if who.rig == owner.rig}
         while len(self._kept) >= MAX_WEARERS:
             del self._kept[next(iter(self._kept))]
         self._kept[owner] = projections
@@ -352,15 +354,16 @@ class HeadsetClient(Endpoint):
                 live_eyes=read_eyes(live.eyes) or EYES,
             )
 
-    def _live_hand(self) -> Float64 | None:
-        """Return the points of the chunks that have arrived, in order if all have."""
+    def _live_hand(self) -> tuple[Float64 | None, bool]:
+        """Return the points of the chunks that have arrived, and whether all have, in order."""
         chunks = [points for _, points in sorted(self._live_chunks.items())]
         points = np.concatenate([np.empty((0, 3)), *chunks])
         shares = [len(points[chunk :: self._live_count]) for chunk in range(len(chunks))]
-        if len(chunks) == self._live_count and shares == [len(chunk) for chunk in chunks]:
+        is_whole = len(chunks) == self._live_count and shares == [len(chunk) for chunk in chunks]
+        if is_whole:
             for number, chunk in enumerate(chunks):
                 points[number :: self._live_count] = chunk
-        return points if len(points) else None
+        return points if len(points) else None, is_whole
 
     def _answer(self, ping: pb.Ping) -> None:
         received_ns = self._clock_ns()

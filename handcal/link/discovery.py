@@ -7,7 +7,7 @@ import socket
 import time
 from dataclasses import dataclass
 
-from zeroconf import Error, IPVersion, ServiceBrowser, ServiceInfo, ServiceListener, Zeroconf
+from zeroconf import Error, IPVersion, ServiceBrowser, ServiceInfo, ServiceStateChange, Zeroconf
 
 from handcal.core.errors import LinkError
 from handcal.io.closable import Closable
@@ -68,13 +68,20 @@ def find_pcs(timeout_s: float = 2.0, interface: str = "") -> list[FoundPC]:
         If the network does not allow it.
     """
     zeroconf = _open(interface)
-    names = _Names()
+    names: set[str] = set()
+
+    def on_change(name: str, state_change: ServiceStateChange, **_: object) -> None:
+        if state_change is ServiceStateChange.Removed:
+            names.discard(name)
+        elif len(names) < _MAX_FOUND:
+            names.add(name)
+
     try:
-        browser = ServiceBrowser(zeroconf, SERVICE, names)
+        browser = ServiceBrowser(zeroconf, SERVICE, handlers=[on_change])
         time.sleep(timeout_s)  # that nobody else answers cannot be known
         browser.cancel()
-        found = (_look_up(zeroconf, name) for name in sorted(names.found)[:_MAX_FOUND])
-        return [one for one in found if one is not None]
+        pcs = (_look_up(zeroconf, name) for name in sorted(names))
+        return [pc for pc in pcs if pc is not None]
     finally:
         zeroconf.close()
 
@@ -84,25 +91,8 @@ def _look_up(zeroconf: Zeroconf, name: str) -> FoundPC | None:
     addresses = info.parsed_addresses() if info is not None else []
     if info is None or not addresses or not info.port:
         return None
-    shown = "".join(one for one in name.removesuffix(f".{SERVICE}") if one >= " ")
+    shown = "".join(char for char in name.removesuffix(f".{SERVICE}") if char >= " ")
     return FoundPC(shown[:_MAX_NAME], (addresses[0], info.port))
-
-
-class _Names(ServiceListener):
-    """Collects the names of services."""
-
-    def __init__(self) -> None:
-        self.found: set[str] = set()
-
-    def add_service(self, zc: Zeroconf, type_: str, name: str) -> None:  # noqa: ARG002
-        if len(self.found) < _MAX_FOUND:
-            self.found.add(name)
-
-    def update_service(self, zc: Zeroconf, type_: str, name: str) -> None:
-        pass
-
-    def remove_service(self, zc: Zeroconf, type_: str, name: str) -> None:  # noqa: ARG002
-        self.found.discard(name)
 
 
 def _open(interface: str, *, is_ipv6: bool = False) -> Zeroconf:

@@ -22,8 +22,8 @@ def drawn_projections(
     if not is_offline:
         return dict(projections)
     return {
-        eye: one if one.P_offline is None else replace(one, P=one.P_offline)
-        for eye, one in projections.items()
+        eye: shown if shown.P_offline is None else replace(shown, P=shown.P_offline)
+        for eye, shown in projections.items()
     }
 
 

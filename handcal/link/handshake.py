@@ -221,12 +221,12 @@ class Reception:
             If the datagram is authentic, but not a hello.
         """
         device = packet.sequence
-        found = self._find(device, datagram, now_s)
-        if found is None:
+        signer = self._find(device, datagram, now_s)
+        if signer is None:
             if self.pairing_desk is None:
                 return Rejection.UNPAIRED
             return self.pairing_desk(packet, datagram, address, now_s)
-        pairing, keys = found
+        pairing, keys = signer
         greeting = read_hello(messages.parse(packet.payload))
         heard = self._recall(device, now_s)
         if self.cookies.accept(greeting.cookie, device, address, now_s):
@@ -262,7 +262,7 @@ class Reception:
         own = self._bound.get(device)
         if own is not None and wire.is_authentic(own[1].to_pc, datagram):
             return own
-        others = [one for one, _ in self._bound.values()]
+        others = [pairing for pairing, _ in self._bound.values()]
         try_all = own is None and bool(others) and self._foreign.allows(now_s)
         offered = self._pairings.offered(now_s, f"{device:016x}")
         for pairing in (*self._unbound, *offered, *(others if try_all else ())):
@@ -276,12 +276,12 @@ class Reception:
         if self._indexed is self._pairings.all:
             return
         self._indexed = self._pairings.all
-        self._unbound = [one for one in self._indexed if not one.device_id]
+        self._unbound = [pairing for pairing in self._indexed if not pairing.device_id]
         self._bound = {}
-        for one in self._indexed:
-            if one.device_id:
-                device = device_number(one.device_id)
-                self._bound[device] = one, wire.handshake_keys(one.key.encode(), device)
+        for pairing in self._indexed:
+            if pairing.device_id:
+                device = device_number(pairing.device_id)
+                self._bound[device] = pairing, wire.handshake_keys(pairing.key.encode(), device)
 
     def _recall(self, device: int, now_s: float) -> _Heard:
         heard = self._heard.get(device)

@@ -54,13 +54,13 @@ def read_invitation(text: str) -> Invitation:
     LinkError
         If it is not an invitation.
     """
-    found = _TEXT.fullmatch(text.strip().upper())
-    if found is None or not 0 < int(found["port"]) < 65536:
+    parts = _TEXT.fullmatch(text.strip().upper())
+    if parts is None or not 0 < int(parts["port"]) < 65536:
         raise LinkError(
             "this is not an invitation from handcal",
             "scan the QR code of handcal pair",
         )
-    return Invitation((found["ipv6"] or found["host"]).lower(), int(found["port"]), found["code"])
+    return Invitation((parts["ipv6"] or parts["host"]).lower(), int(parts["port"]), parts["code"])
 
 
 def qr_matrix(text: str) -> tuple[tuple[bool, ...], ...]:

@@ -196,9 +196,12 @@ class Pairings:
     def offered(self, now_s: float, device_id: str = "") -> tuple[Pairing, ...]:
         """Return the offers to a device that have not ended."""
         with self._lock:
-            self._offers = {key: one for key, one in self._offers.items() if one[0] > now_s}
-            whose = "", device_id
-            return tuple(Pairing(key) for key, one in self._offers.items() if one[1] in whose)
+            self._offers = {
+                key: (end_s, to) for key, (end_s, to) in self._offers.items() if end_s > now_s
+            }
+            return tuple(
+                Pairing(key) for key, (_, to) in self._offers.items() if to in ("", device_id)
+            )
 
     def bind(self, pairing: Pairing, device_id: str, name: str) -> None:
         """Give an open or offered key to a device, in place of the device's older key.
@@ -213,8 +216,8 @@ class Pairings:
         bound = Pairing(pairing.key, device_id, name)
 
         def edit(before: tuple[Pairing, ...]) -> tuple[Pairing, ...]:
-            keep = (one for one in before if one != pairing and one.device_id != device_id)
-            return (*keep, bound)
+            others = (each for each in before if each != pairing and each.device_id != device_id)
+            return (*others, bound)
 
         with self._lock:
             self._offers.pop(pairing.key, None)
@@ -236,7 +239,8 @@ class Pairings:
             self._require(device_id)
             self._change(
                 lambda before: tuple(
-                    replace(one, name=name) if one.device_id == device_id else one for one in before
+                    replace(pairing, name=name) if pairing.device_id == device_id else pairing
+                    for pairing in before
                 )
             )
 
@@ -252,7 +256,9 @@ class Pairings:
         """
         with self._lock:
             self._require(device_id)
-            self._change(lambda before: tuple(one for one in before if one.device_id != device_id))
+            self._change(
+                lambda before: tuple(each for each in before if each.device_id != device_id)
+            )
 
     def renew(self) -> str:
         """Forget every device and return a new key.
@@ -268,7 +274,7 @@ class Pairings:
 
     def _require(self, device_id: str) -> None:
         self.refresh()
-        if not device_id or all(one.device_id != device_id for one in self.all):
+        if not device_id or all(pairing.device_id != device_id for pairing in self.all):
             raise LinkError(f"no device {device_id!r} is paired", "see handcal devices")
 
     def _change(self, edit: Callable[[tuple[Pairing, ...]], tuple[Pairing, ...]]) -> None:
@@ -278,7 +284,7 @@ class Pairings:
                 make_folder(self._path.parent)
                 with _locked(self._path.with_name(f"{self._path.name}.lock")):
                     self.refresh()
-                    stored = [asdict(one) for one in edit(self.all)[-MAX_DEVICES:]]
+                    stored = [asdict(pairing) for pairing in edit(self.all)[-MAX_DEVICES:]]
                     content = json.dumps({"devices": stored}, indent=2)
                     write_atomic(self._path, f"{content}\n".encode(), mode=0o600)
                     self._stamp = self._look()
@@ -289,8 +295,8 @@ class Pairings:
         """Return what changes when the file is replaced; None without a file."""
         with suppress(OSError):
             if self._path is not None:
-                found = self._path.stat()
-                return found.st_ino, found.st_mtime_ns, found.st_size
+                status = self._path.stat()
+                return status.st_ino, status.st_mtime_ns, status.st_size
         return None
 
 

@@ -1,4 +1,7 @@
-"""Buffer of the headset's recent poses, with interpolation between them."""
+"""The headset's poses at times of the host's clock. No sockets; time is an argument.
+
+`ClockEstimator` relates both clocks by pings, `PoseBuffer` interpolates between recent poses.
+"""
 
 from __future__ import annotations
 

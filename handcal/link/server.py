@@ -577,7 +577,7 @@ class HeadsetServer(Endpoint):
                 _LOG.warning("%s; the devices known so far may connect", error)
         if self._session is not None and self._channel is not None:
             caller = self._session.caller
-            known = [(one.key, one.device_id) for one in self._pairings.all]
+            known = [(pairing.key, pairing.device_id) for pairing in self._pairings.all]
             if (caller.pairing.key, caller.device_id) not in known:
                 self._send(pb.Envelope(bye=pb.Bye()))
                 self._channel = None

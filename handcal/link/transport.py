@@ -167,10 +167,10 @@ def resolve(host: str, port: int) -> Address:
         If its name is unknown.
     """
     try:
-        found = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)
+        addresses = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)
     except (OSError, UnicodeError) as error:  # UnicodeError: not a valid name
         raise LinkError(f"unknown host {host!r}", "check its name or use its address") from error
-    best = min(found, key=lambda one: one[0] is not socket.AF_INET)
+    best = min(addresses, key=lambda address: address[0] is not socket.AF_INET)
     return _plain(best[4])
 
 

@@ -50,12 +50,9 @@ _CONFIRMING = (
 )
 """The extension, the profile and the component that confirms, of controllers and hands."""
 _PRESSES = {"LEFT": (-1, 0, 0), "RIGHT": (1, 0, 0), "UP": (0, -1, 0), "DOWN": (0, 1, 0)}
-_PRESSES |= {
-    "EQUAL": (0, 0, 1),
-    "KP_ADD": (0, 0, 1),
-    "MINUS": (0, 0, -1),
-    "KP_SUBTRACT": (0, 0, -1),
-}
+_PRESSES |= dict.fromkeys(("EQUAL", "KP_ADD"), (0, 0, 1))
+_PRESSES |= dict.fromkeys(("MINUS", "KP_SUBTRACT"), (0, 0, -1))
+"""Steps to the right, down and in size by the keys of the window; + is beside or above =."""
 _CONFIRM_KEYS = "SPACE", "ENTER", "KP_ENTER"
 _WINDOW_PX = 640, 360
 _WHOLE = 3  # both bits of XrSpaceLocationFlags and XrViewStateFlags: orientation and position
@@ -75,9 +72,7 @@ class Frame:
     T_W_H: Float64 | None
     """The head at that time; None while the runtime does not track it."""
     views: Mapping[Eye, HeadsetView]
-    """The runtime's own views."""
-    is_seen: bool
-    """False while the runtime shows nothing of this program."""
+    """The runtime's own views; none while it shows nothing of this program."""
     xr_time: int
     xr_views: Any
     """Time and views as the runtime gave them, in W, to be given back with the images."""
@@ -143,20 +138,21 @@ def run_openxr_client(
         link = stack.enter_context(connect(server, pairing_key, identity, clock_ns))
         wearer = _Wearer(link)
         waiting = f"Waiting for the PC at {server[0]}:{server[1]}"
-        while not (is_stopped() or runtime.is_over):  # also after a session of the PC has ended
-            frame = runtime.wait()
-            if frame is None:
-                continue
-            if frame.T_W_H is not None:
-                link.send_pose(frame.T_W_H, frame.display_ns)
-            if _has_moved(identity.views, frame.views):
-                identity = replace(identity, views=frame.views)
-                link.set_identity(identity)
-            wearer.act(runtime)
-            # Read last: what is confirmed next is what is drawn now.
-            wearer.shown = link.state()
-            text = wearer.shown.prompt if link.connected else (link.refusal or waiting)
-            runtime.show(frame, wearer.shown, text)
+        with runtime.failing("the OpenXR runtime has failed"):
+            while not (is_stopped() or runtime.is_over):  # also after a session of the PC has ended
+                frame = runtime.wait()
+                if frame is None:
+                    continue
+                if frame.T_W_H is not None:
+                    link.send_pose(frame.T_W_H, frame.display_ns)
+                if _has_moved(identity.views, frame.views):
+                    identity = replace(identity, views=frame.views)
+                    link.set_identity(identity)
+                wearer.act(runtime)
+                # Read last: what is confirmed next is what is drawn now.
+                wearer.shown = link.state()
+                text = wearer.shown.prompt if link.connected else (link.refusal or waiting)
+                runtime.show(frame, wearer.shown, text)
 
 
 class _Wearer:
@@ -238,7 +234,7 @@ class Runtime(Closable):
         with ExitStack() as stack:
             stack.enter_context(correction_owner(NAME))
             self._open_window(stack)
-            with self._failing("no OpenXR runtime could be used"):
+            with self.failing("no OpenXR runtime could be used"):
                 self._open_session(stack)
             self._painter = Painter()
             self._stack = stack.pop_all()
@@ -248,7 +244,7 @@ class Runtime(Closable):
         self._stack.close()
 
     @contextmanager
-    def _failing(self, what: str) -> Iterator[None]:
+    def failing(self, what: str) -> Iterator[None]:
         """Say of a failure of the runtime what became of it."""
         xr = self._xr
         try:
@@ -405,10 +401,6 @@ class Runtime(Closable):
 
     def wait(self) -> Frame | None:
         """Wait until the next image is wanted; None if none is, for a while."""
-        with self._failing("the OpenXR runtime has failed"):
-            return self._wait()
-
-    def _wait(self) -> Frame | None:
         xr = self._xr
         self._poll()
         if not self._is_running or self.is_over:
@@ -423,7 +415,7 @@ class Runtime(Closable):
         _, xr_views = self._locate(at, self._world)
         own_state, own_views = self._locate(at, self._head)
         views: dict[Eye, HeadsetView] = {}
-        if own_state.view_state_flags & _WHOLE == _WHOLE:
+        if state.should_render and own_state.view_state_flags & _WHOLE == _WHOLE:
             for eye, view in zip(EYES, own_views, strict=True):
                 fov = view.fov
                 angles = fov.angle_left, fov.angle_right, -fov.angle_up, -fov.angle_down
@@ -433,20 +425,15 @@ class Runtime(Closable):
             self._to_clock_ns(at),
             _transform(head.pose) if is_tracked else None,
             views,
-            bool(state.should_render),
             at,
             xr_views,
         )
 
     def show(self, frame: Frame, state: HeadsetState, text: str) -> None:
         """Draw and submit the image of both eyes."""
-        with self._failing("the OpenXR runtime has failed"):
-            self._show(frame, state, text)
-
-    def _show(self, frame: Frame, state: HeadsetState, text: str) -> None:
         xr, glfw = self._xr, self._glfw
         layers = []
-        if frame.is_seen and frame.T_W_H is not None and frame.views:
+        if frame.T_W_H is not None and frame.views:
             parts = []
             for eye, view in zip(EYES, frame.xr_views, strict=True):
                 swapchain, textures, size_px = self._eyes[eye]

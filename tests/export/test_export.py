@@ -56,11 +56,6 @@ ALL_FILES = {
     "session.zip",
 }
 LIGHT: tuple[Format, ...] = ("csv", "yaml", "json", "ply", "zip")
-PREPARED = """
-from handcal.export.export import _import_drawing
-from handcal.core.progress import Progress
-_import_drawing(Progress(report=lambda what, _share: print(what)))
-"""
 # Exports a session, and is killed when half of it is done.
 KILLED = """
 import os, signal, sys
@@ -119,14 +114,6 @@ def test_everything_is_exported_and_told(tmp_path: Path, record: SessionRecord) 
     assert whats > set(titles)
     assert f"{titles[0]}: solving alignment 2 of 2" in whats
     assert np.diff(asked_s).max() < 2.0  # about 0.3 s of work; matplotlib's import takes longest
-
-
-@pytest.mark.process
-def test_it_says_that_it_prepares_fonts_where_they_are_not_known_yet(tmp_path: Path) -> None:
-    command = [sys.executable, "-c", PREPARED]
-    environment = os.environ | {"MPLCONFIGDIR": str(tmp_path)}
-    said = [subprocess.check_output(command, env=environment, text=True) for _ in range(2)]
-    assert said == ["Preparing fonts, once on this computer\n", ""]
 
 
 @pytest.mark.parametrize("name", LIGHT)

@@ -18,7 +18,6 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
-from handcal.core.errors import CancelledError
 from handcal.core.geometry import transform
 from handcal.core.progress import Progress
 from handcal.core.types import EYES, Eye, Float64, Verdict
@@ -27,7 +26,6 @@ from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.export.report import (
     DEFINITIONS,
     distance_rows,
-    overlay_rows,
     residual_rows,
     running_mean_rows,
     session_report,
@@ -263,23 +261,6 @@ def test_the_file_is_a4_with_its_fonts_and_all_pages(
         assert "Eye-display calibration" in run.stdout.decode()
 
 
-@pytest.mark.parametrize("after", [0, 5, 20])
-def test_giving_up_at_any_time_leaves_no_file(
-    tmp_path: Path, outcome: SessionOutcome, after: int
-) -> None:
-    asked = 0
-
-    def give_up(_what: str, _share: float) -> None:
-        nonlocal asked
-        asked += 1
-        if asked > after:
-            raise CancelledError("enough")
-
-    with pytest.raises(CancelledError):
-        write_pdf(tmp_path / "report.pdf", session_report(outcome), Progress(give_up))
-    assert not list(tmp_path.iterdir())
-
-
 def test_it_tells_the_order_of_blinded_comparisons(outcome: SessionOutcome) -> None:
     answers: list[tuple[Drawing, Answer]] = [
         ("offline", "second"),
@@ -331,14 +312,6 @@ def test_residuals_are_the_means_of_the_points_in_each_cell(outcome: SessionOutc
             assert row["mean_residual_mm"] == pytest.approx(1e3 * inliers_m.mean())
         else:
             assert row["mean_residual_mm"] is None
-
-
-def test_outlines_are_told_corner_by_corner() -> None:
-    square = np.array([[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [0.0, 0.0]])
-    rows = list(overlay_rows(3, "left", {"before": {"hand": [], "cursor": [square, square + 1]}}))
-    assert {(row["calibration"], row["of"]) for row in rows} == {("before", "cursor")}
-    assert [row["outline"] for row in rows] == [1] * 4 + [2] * 4
-    assert [[row["x_px"], row["y_px"]] for row in rows[:4]] == square.tolist()
 
 
 def test_the_running_mean_is_of_each_eye_alone(outcome: SessionOutcome) -> None:

@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from handcal.core.types import EYES
 from handcal.export.outcome import SessionOutcome, load_outcome
@@ -17,7 +16,6 @@ from handcal.export.tables import (
     write_tables,
 )
 from handcal.export.tools import write_calibration_json
-from handcal.session.drawn import DrawnShift
 from handcal.session.journal import Event
 from handcal.session.session import SessionRecord
 from handcal.session.trial import COMPARED, Comparison, comparison_json
@@ -147,31 +145,6 @@ def test_trials_hold_every_corner(tmp_path: Path, outcome: SessionOutcome) -> No
     assert [float(row["truth_x_px"]), float(row["truth_y_px"])] == trial.truth_px[3].tolist()
     assert float(row["error_arcmin"]) == trial.error_arcmin[3]
     assert triple(row, "adjusted_phi{}_mm") == (1e3 * trial.adjusted_shift_m).tolist()
-
-
-def test_rows_end_as_the_standard_says_and_hostile_texts_stay_texts(
-    tmp_path: Path, outcome: SessionOutcome
-) -> None:
-    wearer = 'a,"b"\r\n=1+1 φ'
-    named = replace(outcome, record=replace(outcome.record, wearer=wearer))
-    write_tables(tmp_path, table_rows(named))
-    content = (tmp_path / "trials.csv").read_bytes()
-    assert not content.startswith(b"\xef\xbb\xbf")
-    assert content.endswith(b"\r\n")
-    assert {row["wearer"] for row in read(tmp_path / "trials.csv")} == {wearer}
-
-
-@pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t", "\r"])
-def test_no_text_becomes_a_formula(tmp_path: Path, outcome: SessionOutcome, start: str) -> None:
-    wearer = f'{start}HYPERLINK("x")'
-    named = replace(outcome, record=replace(outcome.record, wearer=wearer))
-    assert {row["wearer"] for row in parameters(tmp_path, named)} == {f"'{wearer}"}
-
-
-def test_a_negative_number_stays_a_number(tmp_path: Path, outcome: SessionOutcome) -> None:
-    drawn = dict.fromkeys(EYES, DrawnShift("set by hand", np.full(3, -0.001), is_drawn=True))
-    row = parameters(tmp_path, replace(outcome, results=None, drawn=drawn))[0]
-    assert triple(row, "phi{}_mm") == [-1.0, -1.0, -1.0]
 
 
 def test_comparisons_tell_the_order_and_are_only_written_if_there_are_any(

@@ -16,7 +16,7 @@ from handcal.core.geometry import invert, project, transform
 from handcal.core.progress import Progress
 from handcal.export import window_3d
 from handcal.export.outcome import SessionOutcome, load_outcome
-from handcal.export.window_3d import inspect_session, make_scenes, residual_colors
+from handcal.export.window_3d import inspect_session, make_scenes
 from handcal.io.images import read_image
 from handcal.io.resources import resource_path
 from handcal.session.session import Session, SessionRecord
@@ -56,14 +56,6 @@ def test_displays_and_eyes_stand_as_on_the_rig() -> None:
 
 def test_a_session_without_alignments_has_no_scenes(empty: SessionRecord) -> None:
     assert make_scenes(load_outcome(empty)) == {}
-
-
-def test_residuals_are_darker_the_larger_and_outliers_are_red() -> None:
-    colors = residual_colors(np.array([0.0, 0.001, 0.003, 0.005, 0.020, np.nan]))
-    brightness = colors[:5] @ [0.21, 0.72, 0.07]
-    assert (np.diff(brightness[:4]) < 0.0).all()
-    assert np.array_equal(colors[3], colors[4])
-    assert colors[5] == pytest.approx([0.9, 0.1, 0.1])
 
 
 needs_open3d = pytest.mark.skipif(find_spec("open3d") is None, reason="Open3D is not installed")

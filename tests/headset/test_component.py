@@ -89,6 +89,26 @@ def server(pairings: Pairings) -> Iterator[HeadsetServer]:
         yield server
 
 
+@pytest.fixture
+def app(start: Start, server: HeadsetServer) -> UnityPlayer:
+    """Return an app that is paired and connected."""
+    app = start(invitation=invitation(server))
+    app.until(is_connected)
+    return app
+
+
+def confirmed(app: UnityPlayer, server: HeadsetServer) -> list[Confirmation]:
+    """Return the confirmations once there are any."""
+    confirmations: list[Confirmation] = []
+
+    def is_confirmed(_: object) -> bool:
+        confirmations.extend(server.confirmations())
+        return bool(confirmations)
+
+    app.until(is_confirmed)
+    return confirmations
+
+
 @cache
 def invitation(server: HeadsetServer) -> str:
     """Return what the QR code of the first request says; an app pairs by it once."""
@@ -221,10 +241,10 @@ def test_points_are_drawn_where_the_eye_needs_them(
     assert "PlanarManual" not in app.state()["reprojection"]
 
 
-def test_the_target_is_drawn_where_the_eye_needs_it(start: Start, server: HeadsetServer) -> None:
+def test_the_target_is_drawn_where_the_eye_needs_it(
+    app: UnityPlayer, server: HeadsetServer
+) -> None:
     """It is fixed in V, while the view that is drawn with has the eye at its origin."""
-    app = start(invitation=invitation(server))
-    app.until(is_connected)
     corners_V_m = target_corners_m(0.5)
     server.send_target(Target("right", corners_V_m))
     display = example_rig().eyes["right"]
@@ -246,9 +266,7 @@ def test_the_target_is_drawn_where_the_eye_needs_it(start: Start, server: Headse
         app.until(is_there)
 
 
-def test_a_calibration_by_keys(start: Start, server: HeadsetServer) -> None:
-    app = start(invitation=invitation(server))
-    app.until(is_connected)
+def test_a_calibration_by_keys(app: UnityPlayer, server: HeadsetServer) -> None:
     send_projections(server)
     server.send_cursor(SQUARE_M, 7)
     server.send_prompt("Cover the blue hand with your own, then say confirm or press the trigger.")
@@ -257,13 +275,7 @@ def test_a_calibration_by_keys(start: Start, server: HeadsetServer) -> None:
     )
     assert max(map(len, told["text"].split("/"))) <= 32
     app.do("press Space")
-    confirmations: list[Confirmation] = []
-
-    def is_confirmed(_: object) -> bool:
-        confirmations.extend(server.confirmations())
-        return bool(confirmations)
-
-    app.until(is_confirmed)
+    confirmations = confirmed(app, server)
     assert [(one.cursor_id, one.problem) for one in confirmations] == [(7, "")]
 
     server.send_cursor(np.zeros((0, 3)), 8)
@@ -289,21 +301,13 @@ def test_a_calibration_by_keys(start: Start, server: HeadsetServer) -> None:
     ["TriggerButton", "left PrimaryButton", "right PointerActivated", "right PinchTouched"],
 )
 def test_a_hand_confirms_and_never_nudges(
-    start: Start, server: HeadsetServer, gesture: str
+    app: UnityPlayer, server: HeadsetServer, gesture: str
 ) -> None:
     """An air tap of HoloLens 2 is its hand's primary button, which enlarges on a controller."""
-    app = start(invitation=invitation(server))
-    app.until(is_connected)
     server.send_cursor(SQUARE_M, 7)
     app.until(lambda told: told["cursor"])
     app.do("hold left GripButton", "hold right SecondaryButton", f"hold {gesture}", "frames 5")
-    confirmations: list[Confirmation] = []
-
-    def is_confirmed(_: object) -> bool:
-        confirmations.extend(server.confirmations())
-        return bool(confirmations)
-
-    app.until(is_confirmed)
+    confirmations = confirmed(app, server)
     server.send_verify(VerifyRequest(3, "right", 1.0, 0.002))
     nudges: list[Nudge] = []
 
@@ -314,7 +318,7 @@ def test_a_hand_confirms_and_never_nudges(
 
     app.until(is_nudged)
     assert all(nudge.fits and nudge.moved == NudgeSum() for nudge in nudges)
-    assert len(confirmations) == 1
+    assert len(confirmations + server.confirmations()) == 1
 
 
 def test_the_calibration_is_kept_when_the_app_and_the_pc_are_gone(
@@ -352,10 +356,8 @@ def test_settings_that_make_a_calibration_worthless_are_said_in_view(
 
 
 def test_a_pose_is_stamped_with_the_time_that_the_runtime_predicts(
-    start: Start, server: HeadsetServer
+    app: UnityPlayer, server: HeadsetServer
 ) -> None:
-    app = start(invitation=invitation(server))
-    app.until(is_connected)
 
     app.state(30)
     assert not is_ahead(server)
@@ -397,9 +399,7 @@ def test_a_view_that_moves_is_said_once(start: Start) -> None:
     assert "moved" not in told["text"]
 
 
-def test_a_cursor_is_hidden_from_the_other_eye(start: Start, server: HeadsetServer) -> None:
-    app = start(invitation=invitation(server))
-    app.until(is_connected)
+def test_a_cursor_is_hidden_from_the_other_eye(app: UnityPlayer, server: HeadsetServer) -> None:
     send_projections(server)
     # The third is as from an older PC: for both eyes.
     shown: list[tuple[Eye, ...]] = [("left",), ("right",), (), EYES]
@@ -415,9 +415,7 @@ def test_a_cursor_is_hidden_from_the_other_eye(start: Start, server: HeadsetServ
     assert faults(app.state()) == []
 
 
-def test_live_hands_of_any_size_are_drawn(start: Start, server: HeadsetServer) -> None:
-    app = start(invitation=invitation(server))
-    app.until(is_connected)
+def test_live_hands_of_any_size_are_drawn(app: UnityPlayer, server: HeadsetServer) -> None:
     for count in (50, 800, 20, 21, 0, 5):
         outline = np.random.default_rng(count).normal(0.0, 0.05, (count, 3))
 
@@ -430,10 +428,8 @@ def test_live_hands_of_any_size_are_drawn(start: Start, server: HeadsetServer) -
 
 
 def test_a_disabled_component_leaves_nothing_and_comes_back(
-    start: Start, server: HeadsetServer
+    app: UnityPlayer, server: HeadsetServer
 ) -> None:
-    app = start(invitation=invitation(server))
-    app.until(is_connected)
     send_projections(server)
     app.until(lambda told: told["wearer"] == "Ada")
     app.do("disable")

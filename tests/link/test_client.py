@@ -1,6 +1,7 @@
 """The headset's end: against the real server over a bad network, and against a hostile one."""
 
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from handcal.core.errors import PosePendingError
 from handcal.core.geometry import rigid
 from handcal.core.types import EYES, Eye, HeadsetIdentity, HeadsetView, Projection
 from handcal.link import client as client_module
+from handcal.link import messages
 from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.fields import MalformedError, read_text
 from handcal.link.impair import Impairment
@@ -28,18 +30,34 @@ def headset_clock_ns() -> int:
     return time.monotonic_ns() + OFFSET_NS
 
 
-def test_everything_gets_through_a_bad_network(server: HeadsetServer, pairing_key: bytes) -> None:
-    with HeadsetClient(server.address, pairing_key, IDENTITY, impairment=BAD) as client:
-        sent = [
-            server.send_cursor(hand(), 3, ["right"]),
-            server.send_prompt("Cover the outline", ["right"]),
-            server.send_projection(projection("left", 1.0)),
-            server.send_projection(projection("right", 2.0)),
-            server.send_target(TARGET),
-        ]
-        for message in sent:
-            server.wait_acked(message, 5.0)
-        state, statistics = client.state(), server.statistics()
+@pytest.fixture
+def client(server: HeadsetServer, pairing_key: bytes) -> Iterator[HeadsetClient]:
+    with HeadsetClient(server.address, pairing_key, IDENTITY) as client:
+        yield client
+
+
+@pytest.fixture
+def bad_client(server: HeadsetServer, pairing_key: bytes) -> Iterator[HeadsetClient]:
+    """Return a client behind a bad network, with a clock of its own."""
+    with HeadsetClient(
+        server.address, pairing_key, IDENTITY, headset_clock_ns, impairment=BAD
+    ) as client:
+        yield client
+
+
+def test_everything_gets_through_a_bad_network(
+    server: HeadsetServer, bad_client: HeadsetClient
+) -> None:
+    sent = [
+        server.send_cursor(hand(), 3, ["right"]),
+        server.send_prompt("Cover the outline", ["right"]),
+        server.send_projection(projection("left", 1.0)),
+        server.send_projection(projection("right", 2.0)),
+        server.send_target(TARGET),
+    ]
+    for message in sent:
+        server.wait_acked(message, 5.0)
+    state, statistics = bad_client.state(), server.statistics()
     assert state.cursor_W_m is not None
     np.testing.assert_allclose(state.cursor_W_m, hand(), atol=5.1e-5)
     assert (state.cursor_id, state.prompt, state.eyes) == (3, "Cover the outline", ("right",))
@@ -53,35 +71,31 @@ def test_everything_gets_through_a_bad_network(server: HeadsetServer, pairing_ke
     assert sum(statistics.rejected.values()) == statistics.rejected["replayed"]
 
 
-def test_the_newest_of_many_stays(server: HeadsetServer, pairing_key: bytes) -> None:
-    with HeadsetClient(server.address, pairing_key, IDENTITY, impairment=BAD) as client:
-        client.wait_connected(5.0)
-        seen: list[float] = []
-        for i in range(1, 41):
-            last = server.send_projection(projection("left", float(i)))
-            time.sleep(0.005)
-            shown = client.state().projections.get("left")
-            seen += [shown.P[0, 0]] if shown else []
-        server.wait_acked(last, 5.0)
-        time.sleep(0.1)
-        seen.append(client.state().projections["left"].P[0, 0])
+def test_the_newest_of_many_stays(server: HeadsetServer, bad_client: HeadsetClient) -> None:
+    bad_client.wait_connected(5.0)
+    seen: list[float] = []
+    for i in range(1, 41):
+        last = server.send_projection(projection("left", float(i)))
+        time.sleep(0.005)
+        shown = bad_client.state().projections.get("left")
+        seen += [shown.P[0, 0]] if shown else []
+    server.wait_acked(last, 5.0)
+    time.sleep(0.1)
+    seen.append(bad_client.state().projections["left"].P[0, 0])
     assert seen == sorted(seen)
     assert seen[-1] == 40.0
 
 
 def test_a_confirmation_arrives_once_on_the_hosts_clock(
-    server: HeadsetServer, pairing_key: bytes
+    server: HeadsetServer, bad_client: HeadsetClient
 ) -> None:
     confirmations = []
-    with HeadsetClient(
-        server.address, pairing_key, IDENTITY, headset_clock_ns, impairment=BAD
-    ) as client:
-        server.wait_acked(server.send_cursor(hand(), 5), 5.0)
-        t_host_ns = time.monotonic_ns()
-        client.wait_acked(client.confirm(t_host_ns + OFFSET_NS, client.state()), 5.0)
-        for _ in range(100):
-            confirmations += server.confirmations()
-            time.sleep(0.02)
+    server.wait_acked(server.send_cursor(hand(), 5), 5.0)
+    t_host_ns = time.monotonic_ns()
+    bad_client.wait_acked(bad_client.confirm(t_host_ns + OFFSET_NS, bad_client.state()), 5.0)
+    for _ in range(100):
+        confirmations += server.confirmations()
+        time.sleep(0.02)
     (confirmation,) = confirmations
     assert confirmation.cursor_id == 5
     assert confirmation.problem == ""
@@ -108,94 +122,89 @@ def confirmed(server: HeadsetServer, client: HeadsetClient, state: HeadsetState)
 
 
 def test_a_confirmation_of_stale_drawings_is_found_out(
-    server: HeadsetServer, pairing_key: bytes
+    server: HeadsetServer, client: HeadsetClient
 ) -> None:
     P = np.arange(12.0).reshape(3, 4)
-    with HeadsetClient(server.address, pairing_key, IDENTITY) as client:
-        server.wait_acked(server.send_projection(Projection("left", P, 1268, 720)), 5.0)
-        server.wait_acked(server.send_cursor(hand(), 1), 5.0)
-        first = client.state()
-        assert confirmed(server, client, first) == ""
-        moved = Projection("left", P, 1268, 720, P_offline=P + 1e-9)
-        server.wait_acked(server.send_projection(moved), 5.0)
-        second = client.state()
-        assert confirmed(server, client, second) == ""
-        server.wait_acked(server.send_show(is_offline=True), 5.0)
-        assert "other projections" in confirmed(server, client, second)
-        assert confirmed(server, client, client.state()) == ""
-        server.wait_acked(server.send_show(is_offline=False), 5.0)
-        server.wait_acked(server.send_cursor(hand(1), 1), 5.0)
-        assert "another cursor" in confirmed(server, client, second)
-        assert confirmed(server, client, client.state()) == ""
+    server.wait_acked(server.send_projection(Projection("left", P, 1268, 720)), 5.0)
+    server.wait_acked(server.send_cursor(hand(), 1), 5.0)
+    first = client.state()
+    assert confirmed(server, client, first) == ""
+    moved = Projection("left", P, 1268, 720, P_offline=P + 1e-9)
+    server.wait_acked(server.send_projection(moved), 5.0)
+    second = client.state()
+    assert confirmed(server, client, second) == ""
+    server.wait_acked(server.send_show(is_offline=True), 5.0)
+    assert "other projections" in confirmed(server, client, second)
+    assert confirmed(server, client, client.state()) == ""
+    server.wait_acked(server.send_show(is_offline=False), 5.0)
+    server.wait_acked(server.send_cursor(hand(1), 1), 5.0)
+    assert "another cursor" in confirmed(server, client, second)
+    assert confirmed(server, client, client.state()) == ""
 
 
 def test_a_cursor_of_an_older_pc_is_for_both_eyes(
-    server: HeadsetServer, pairing_key: bytes
+    server: HeadsetServer, client: HeadsetClient
 ) -> None:
-    with HeadsetClient(server.address, pairing_key, IDENTITY) as client:
-        server.wait_acked(server.send_cursor(hand(), 3, ["right"]), 5.0)
-        right = client.state()
-        server.wait_acked(server.send_cursor(hand(), 3, []), 5.0)
-        assert client.state().cursor_eyes == EYES
-        # A headset that does not know the eyes makes the same digest.
-        assert confirmed(server, client, right) == ""
+    server.wait_acked(server.send_cursor(hand(), 3, ["right"]), 5.0)
+    right = client.state()
+    server.wait_acked(server.send_cursor(hand(), 3, []), 5.0)
+    assert client.state().cursor_eyes == EYES
+    # A headset that does not know the eyes makes the same digest.
+    assert confirmed(server, client, right) == ""
 
 
-def test_a_lost_datagram_loses_no_pose(server: HeadsetServer, pairing_key: bytes) -> None:
-    with HeadsetClient(
-        server.address, pairing_key, IDENTITY, headset_clock_ns, impairment=BAD
-    ) as client:
-        client.wait_connected(5.0)
-        start_ns, period_ns = headset_clock_ns(), 10_000_000
-        for i in range(100):
-            client.send_pose(rigid(translation_m=[i / 1000, 0.0, 0.0]), start_ns + i * period_ns)
-            time.sleep(0.001)
-        time.sleep(0.05)
-        # 30 % lost would leave 70 Hz; a pose is lost only with three datagrams in a row.
-        assert server.statistics().pose_rate_hz > 90.0
-        eventually(lambda: server.statistics().clock_offset_ms is not None)
-        middle_ns = start_ns - OFFSET_NS + 50 * period_ns
-        assert server.pose_at_host_ns(middle_ns)[0, 3] == pytest.approx(0.05, abs=0.001)
+def test_a_lost_datagram_loses_no_pose(server: HeadsetServer, bad_client: HeadsetClient) -> None:
+    bad_client.wait_connected(5.0)
+    start_ns, period_ns = headset_clock_ns(), 10_000_000
+    for i in range(100):
+        bad_client.send_pose(rigid(translation_m=[i / 1000, 0.0, 0.0]), start_ns + i * period_ns)
+        time.sleep(0.001)
+    time.sleep(0.05)
+    # 30 % lost would leave 70 Hz; a pose is lost only with three datagrams in a row.
+    assert server.statistics().pose_rate_hz > 90.0
+    eventually(lambda: server.statistics().clock_offset_ms is not None)
+    middle_ns = start_ns - OFFSET_NS + 50 * period_ns
+    assert server.pose_at_host_ns(middle_ns)[0, 3] == pytest.approx(0.05, abs=0.001)
 
 
-def test_loss_only_thins_the_live_hand(server: HeadsetServer, pairing_key: bytes) -> None:
+def test_loss_only_thins_the_live_hand(server: HeadsetServer, bad_client: HeadsetClient) -> None:
     counts = []
-    with HeadsetClient(server.address, pairing_key, IDENTITY, impairment=BAD) as client:
-        server.wait_connected(5.0)
-        for i in range(20):
-            server.send_live_hand(hand(i), is_over_limit=i % 2 == 0)
-            time.sleep(0.03)
-            state = client.state()
-            if state.live_W_m is not None:
-                counts.append(len(state.live_W_m))
+    server.wait_connected(5.0)
+    for i in range(20):
+        server.send_live_hand(hand(i), is_over_limit=i % 2 == 0)
+        time.sleep(0.03)
+        state = bad_client.state()
+        if state.live_W_m is not None:
+            counts.append(len(state.live_W_m))
     assert 0.3 * 5000 < np.mean(counts) < 0.9 * 5000
 
 
 def test_the_live_hand_carries_its_colour_and_its_absence(
-    server: HeadsetServer, pairing_key: bytes
+    server: HeadsetServer, client: HeadsetClient
 ) -> None:
-    with HeadsetClient(server.address, pairing_key, IDENTITY) as client:
-        server.wait_connected(5.0)
-        server.send_live_hand(hand(), is_over_limit=True)
-        eventually(lambda: client.state().live_W_m is not None and client.state().is_over_limit)
-        server.send_live_hand(np.empty((0, 3)), is_over_limit=False)
-        eventually(lambda: client.state().live_W_m is None and not client.state().is_over_limit)
+    server.wait_connected(5.0)
+    server.send_live_hand(hand(), is_over_limit=True)
+    eventually(lambda: client.state().live_W_m is not None and client.state().is_over_limit)
+    server.send_live_hand(np.empty((0, 3)), is_over_limit=False)
+    eventually(lambda: client.state().live_W_m is None and not client.state().is_over_limit)
 
 
-def test_a_cursor_can_be_taken_away(server: HeadsetServer, pairing_key: bytes) -> None:
-    with HeadsetClient(server.address, pairing_key, IDENTITY) as client:
-        server.wait_acked(server.send_cursor(hand(), 1), 5.0)
-        assert client.state().cursor_W_m is not None
-        server.wait_acked(server.send_cursor(np.empty((0, 3)), 2), 5.0)
-        assert client.state().cursor_W_m is None
-
-
-def test_a_target_can_be_taken_away(server: HeadsetServer, pairing_key: bytes) -> None:
-    with HeadsetClient(server.address, pairing_key, IDENTITY) as client:
-        server.wait_acked(server.send_target(TARGET), 5.0)
-        assert client.state().target is not None
-        server.wait_acked(server.send_target(None), 5.0)
-        assert client.state().target is None
+def test_what_is_shown_can_be_taken_away(server: HeadsetServer, client: HeadsetClient) -> None:
+    cube = Shape(np.arange(24.0).reshape(8, 3), ("right",))
+    for message in (server.send_cursor(hand(), 1), server.send_target(TARGET)):
+        server.wait_acked(message, 5.0)
+    server.wait_acked(server.send_shape(cube), 5.0)
+    state = client.state()
+    assert state.cursor_W_m is not None
+    assert state.target is not None
+    assert state.shape is not None
+    assert state.shape.eyes == ("right",)
+    np.testing.assert_array_equal(state.shape.corners_W_m, cube.corners_W_m)
+    server.send_cursor(np.empty((0, 3)), 2)
+    for message in (server.send_target(None), server.send_shape(None)):
+        server.wait_acked(message, 5.0)
+    eventually(lambda: client.state().cursor_W_m is None)
+    assert (client.state().target, client.state().shape) == (None, None)
 
 
 def test_a_headset_introduces_itself_and_says_what_has_changed(
@@ -215,66 +224,67 @@ def test_a_headset_introduces_itself_and_says_what_has_changed(
 
 
 def test_projections_are_kept_by_wearer_and_dropped_with_the_rig(
-    server: HeadsetServer, pairing_key: bytes
+    server: HeadsetServer, client: HeadsetClient
 ) -> None:
     def send(wearer: str, rig: str, eye: Eye = "left") -> None:
         P = np.full((3, 4), float(len(wearer)))
         made = Projection(eye, P, 1268, 720, wearer=wearer, rig=rig)
         server.wait_acked(server.send_projection(made), 5.0)
 
-    with HeadsetClient(server.address, pairing_key, IDENTITY) as client:
-        send("Anna", "rig A")
-        send("Anna", "rig A", "right")
-        assert set(client.state().projections) == set(EYES)
-        send("Bo", "rig A")
-        assert set(client.state().projections) == {"left"}  # not the right eye's of Anna
-        assert set(client.kept) == {Owner("Anna", "rig A"), Owner("Bo", "rig A")}
-        eventually(lambda: server.shown == Owner("Bo", "rig A"))
-        client.show_kept(Owner("Anna", "rig A"))
-        assert client.state().projections["right"].P[0, 0] == 4.0
-        eventually(lambda: server.shown == Owner("Anna", "rig A"))
-        send("Cleo", "rig B")
-        assert set(client.kept) == {Owner("Cleo", "rig B")}
-        eventually(lambda: server.shown == Owner("Cleo", "rig B"))
+    send("Anna", "rig A")
+    send("Anna", "rig A", "right")
+    assert set(client.state().projections) == set(EYES)
+    send("Bo", "rig A")
+    assert set(client.state().projections) == {"left"}  # not the right eye's of Anna
+    assert set(client.kept) == {Owner("Anna", "rig A"), Owner("Bo", "rig A")}
+    eventually(lambda: server.shown == Owner("Bo", "rig A"))
+    client.show_kept(Owner("Anna", "rig A"))
+    assert client.state().projections["right"].P[0, 0] == 4.0
+    eventually(lambda: server.shown == Owner("Anna", "rig A"))
+    send("Cleo", "rig B")
+    assert set(client.kept) == {Owner("Cleo", "rig B")}
+    eventually(lambda: server.shown == Owner("Cleo", "rig B"))
 
 
-def test_shapes_and_the_offline_calibration_are_shown_and_taken_away(
-    server: HeadsetServer, pairing_key: bytes
+def test_the_offline_calibration_is_drawn_meanwhile(
+    server: HeadsetServer, client: HeadsetClient
 ) -> None:
-    cube = Shape(np.arange(24.0).reshape(8, 3), ("right",))
-    with HeadsetClient(server.address, pairing_key, IDENTITY) as client:
-        server.wait_acked(server.send_shape(cube), 5.0)
-        shape = client.state().shape
-        assert shape is not None
-        assert shape.eyes == ("right",)
-        np.testing.assert_array_equal(shape.corners_W_m, cube.corners_W_m)
-        server.wait_acked(server.send_shape(None), 5.0)
-        assert client.state().shape is None
-        made = Projection("left", np.ones((3, 4)), 9, 8, P_offline=np.zeros((3, 4)))
-        server.wait_acked(server.send_projection(made), 5.0)
-        server.wait_acked(server.send_show(is_offline=True), 5.0)
-        assert client.state().drawn["left"].P[0, 0] == 0.0
-        assert client.state().projections["left"].P[0, 0] == 1.0
+    made = Projection("left", np.ones((3, 4)), 9, 8, P_offline=np.zeros((3, 4)))
+    server.wait_acked(server.send_projection(made), 5.0)
+    server.wait_acked(server.send_show(is_offline=True), 5.0)
+    assert client.state().drawn["left"].P[0, 0] == 0.0
+    assert client.state().projections["left"].P[0, 0] == 1.0
 
 
 def test_an_outline_arrives_in_order_for_its_eyes(
-    server: HeadsetServer, pairing_key: bytes
+    server: HeadsetServer, client: HeadsetClient
 ) -> None:
     outline = np.column_stack([np.linspace(0, 1, 650), np.zeros(650), np.zeros(650)])
-    with HeadsetClient(server.address, pairing_key, IDENTITY) as client:
-        server.wait_connected(5.0)
-        server.send_live_hand(outline, is_over_limit=False, eyes=("left",), is_outline=True)
+    server.wait_connected(5.0)
+    server.send_live_hand(outline, is_over_limit=False, eyes=("left",), is_outline=True)
 
-        def is_whole() -> bool:
-            live_W_m = client.state().live_W_m
-            return live_W_m is not None and len(live_W_m) == len(outline)
+    def is_whole() -> bool:
+        live_W_m = client.state().live_W_m
+        return live_W_m is not None and len(live_W_m) == len(outline)
 
-        eventually(is_whole)
-        state = client.state()
+    eventually(is_whole)
+    state = client.state()
     assert state.live_W_m is not None
     assert state.is_outline
     assert state.live_eyes == ("left",)
     np.testing.assert_allclose(state.live_W_m, outline, atol=1e-4)
+
+
+def test_an_outline_with_a_missing_chunk_is_points(
+    server: HeadsetServer, client: HeadsetClient
+) -> None:
+    whole = messages.live_hand(hand(count=650), False, 10**6, is_outline=True)
+    assert len(whole) > 2
+    server.wait_connected(5.0)
+    with server._changed:
+        server._stream.extend(whole[1:])
+    eventually(lambda: client.state().live_W_m is not None)
+    assert not client.state().is_outline
 
 
 @pytest.mark.parametrize("step_s", [-0.3, 0.3])

@@ -161,15 +161,6 @@ def test_ipv6_and_both(pairing_key: bytes, bind: str) -> None:
             eventually(lambda: not server.connected)
 
 
-def test_a_wrong_key_connects_nobody(server: HeadsetServer) -> None:
-    with (
-        HeadsetClient(server.address, b"another pairing key", IDENTITY) as client,
-        pytest.raises(LinkError, match="key"),
-    ):
-        client.wait_connected(0.3)
-    assert server.statistics().rejected["unpaired"] > 0
-
-
 def test_the_pc_says_good_bye(pairing_key: bytes) -> None:
     before = threading.active_count()
     server = HeadsetServer(pairing_key)

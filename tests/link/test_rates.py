@@ -1,28 +1,19 @@
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
+from typing import Any
 
 import pytest
 
 from handcal.link.statistics import LinkRates, LinkStatistics, link_rates
 
-START = LinkStatistics(
-    connected=True,
+NOTHING: dict[str, Any] = dict.fromkeys((field.name for field in fields(LinkStatistics)), 0)
+START = replace(
+    LinkStatistics(**NOTHING),
     sent=1000,
     received=500,
     lost=10,
     lost_inbound=20,
-    resent=0,
-    acked=0,
-    unacked=0,
-    failed=0,
-    rejected={},
-    pose_rate_hz=60.0,
-    latency_ms=None,
-    clock_offset_ms=None,
-    clock_drift_ppm=None,
-    clock_drift_uncertainty_ppm=None,
-    clock_uncertainty_ms=None,
     bytes_sent=100_000,
     bytes_received=50_000,
 )

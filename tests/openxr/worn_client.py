@@ -9,6 +9,8 @@ from __future__ import annotations
 import struct
 import sys
 import threading
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,14 +24,14 @@ from handcal.link.transport import Address
 from handcal.openxr_client.client import run_openxr_client
 from tests.helpers import ROOT
 
-_WEARER = struct.Struct("<7dq")
+_WEARER = struct.Struct("<7d2q")
 _PRESS_FRAMES = 5
 
 
-def write_wearer(path: Path, T_W_H: Float64, is_pressed: bool = False) -> None:
-    """Move the test runtime's head and button (TEST_HEAD)."""
+def write_wearer(path: Path, T_W_H: Float64, is_pressed: bool = False, t_ns: int = 0) -> None:
+    """Move the test runtime's head and button (TEST_HEAD), as of a time of the monotonic clock."""
     head = pose(opengl_transform(T_W_H))
-    numbers = _WEARER.pack(*head.quaternion_xyzw, *head.position_m, is_pressed)
+    numbers = _WEARER.pack(*head.quaternion_xyzw, *head.position_m, is_pressed, t_ns)
     with path.open("r+b" if path.exists() else "wb") as file:
         file.write(numbers)
 
@@ -45,8 +47,14 @@ def run() -> None:
     """Run ``handcal`` with the OpenXR client; the file for its head is the first argument."""
     head = Path(sys.argv.pop(1))
 
-    def worn(server: Address, key: bytes, identity: HeadsetIdentity, *_: Any, **__: Any) -> Worn:
-        return Worn(head, server, key, identity)
+    def worn(
+        server: Address,
+        key: bytes,
+        identity: HeadsetIdentity,
+        clock_ns: Callable[[], int],
+        **_: object,
+    ) -> Worn:
+        return Worn(head, server, key, identity, clock_ns)
 
     vars(handcal.sim.headset)["HeadsetClient"] = worn
     handcal.cli.main.main()
@@ -55,8 +63,16 @@ def run() -> None:
 class Worn(Closable):
     """The interface of `HeadsetClient` for the wearer's side of the virtual headset."""
 
-    def __init__(self, head: Path, server: Address, key: bytes, identity: HeadsetIdentity) -> None:
+    def __init__(
+        self,
+        head: Path,
+        server: Address,
+        key: bytes,
+        identity: HeadsetIdentity,
+        clock_ns: Callable[[], int],
+    ) -> None:
         self._head = head
+        self._clock_ns = clock_ns
         self._link: HeadsetClient | None = None
         self._presses = 0
         self._is_closed = threading.Event()
@@ -83,9 +99,10 @@ class Worn(Closable):
         is_open = self._link is not None and self._thread.is_alive() and not self.dismissed
         return self._link.state() if self._link is not None and is_open else HeadsetState()
 
-    def send_pose(self, T_W_H: Float64, _: int) -> None:
+    def send_pose(self, T_W_H: Float64, t_headset_ns: int) -> None:
         self._presses = max(0, self._presses - 1)
-        write_wearer(self._head, T_W_H, self._presses > 0)
+        t_ns = t_headset_ns - (self._clock_ns() - time.monotonic_ns())
+        write_wearer(self._head, T_W_H, self._presses > 0, t_ns)
 
     def confirm(self, *_: object) -> None:
         self._presses = _PRESS_FRAMES

@@ -52,9 +52,12 @@ static bool is_ready;
 typedef struct {
     double pose[7]; /* of the head in LOCAL: x y z w, metres */
     int64_t is_pressed;
+    int64_t t_ns; /* the time of both, which frames then have; 0: that of the clock */
 } Wearer;
 static const volatile Wearer *wearer; /* written by the test */
+static Wearer worn;                   /* as it is in this frame */
 static bool has_clock;
+static XrTime changed; /* when the button was */
 
 static XrPosef multiply(XrPosef a, XrPosef b) {
     const double x = a.orientation.x, y = a.orientation.y, z = a.orientation.z, w = a.orientation.w;
@@ -76,7 +79,7 @@ static XrPosef multiply(XrPosef a, XrPosef b) {
 /* The head in LOCAL space: it turns and walks, with its head 1.7 m above the floor. */
 static XrPosef head(XrTime time) {
     if (wearer) {
-        const volatile double *n = wearer->pose;
+        const double *n = worn.pose;
         return (XrPosef){{(float)n[0], (float)n[1], (float)n[2], (float)n[3]},
                          {(float)n[4], (float)n[5], (float)n[6]}};
     }
@@ -152,6 +155,7 @@ static XrResult XRAPI_CALL CreateInstance(const XrInstanceCreateInfo *info, XrIn
         void *there = mmap(NULL, sizeof *wearer, PROT_READ, MAP_SHARED, file, 0);
         if (there == MAP_FAILED) return XR_ERROR_RUNTIME_FAILURE;
         wearer = there;
+        worn = *wearer;
         close(file);
     }
 #endif
@@ -234,7 +238,14 @@ static XrResult XRAPI_CALL WaitFrame(XrSession s, const XrFrameWaitInfo *info, X
         const XrTime now_ns = now.tv_sec * 1000000000 + now.tv_nsec, period_ns = 11111111;
         const XrTime next_ns = (now_ns / period_ns + 1) * period_ns;
         usleep((unsigned)((next_ns - now_ns) / 1000));
-        to->predictedDisplayTime = wearer ? next_ns : next_ns + 2 * period_ns;
+        to->predictedDisplayTime = next_ns + 2 * period_ns;
+        if (wearer) {
+            const Wearer before = worn;
+            do worn = *wearer; /* again, if it is written meanwhile */
+            while (worn.t_ns != wearer->t_ns);
+            to->predictedDisplayTime = worn.t_ns > before.t_ns ? worn.t_ns : next_ns;
+            if (worn.is_pressed != before.is_pressed) changed = to->predictedDisplayTime;
+        }
         to->predictedDisplayPeriod = period_ns;
         to->shouldRender = XR_TRUE;
         return XR_SUCCESS;
@@ -542,17 +553,11 @@ static XrResult XRAPI_CALL AttachSessionActionSets(XrSession s,
 }
 
 static int64_t was_pressed, is_pressed;
-static XrTime changed;
 
 static XrResult XRAPI_CALL SyncActions(XrSession s, const XrActionsSyncInfo *info) {
     (void)s, (void)info;
     was_pressed = is_pressed;
-    is_pressed = wearer ? wearer->is_pressed : 0;
-#ifndef _WIN32
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    if (was_pressed != is_pressed) changed = now.tv_sec * 1000000000 + now.tv_nsec;
-#endif
+    is_pressed = worn.is_pressed;
     return XR_SUCCESS;
 }
 static XrResult XRAPI_CALL GetActionStateBoolean(XrSession s, const XrActionStateGetInfo *info,
