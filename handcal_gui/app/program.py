@@ -89,7 +89,13 @@ class Program(QObject):
         self.live = CalibrationController(self.window, self.wizard_panel, comparison)
         self.review = ReviewController(self.window, review_page, comparison)
         self.windows = SeparateWindows(
-            self.window, self.start, self.live, self.review, self._current
+            self.window,
+            self.start,
+            self.live,
+            self.review,
+            self._current,
+            self.open_session,
+            self.resume_session,
         )
         self._connect(review_page)
         self._make_menus()
@@ -200,8 +206,6 @@ class Program(QObject):
         self.start.rig_wanted.connect(self.windows.calibrate_rig)
         self.start.connect_wanted.connect(self.windows.connect_headset)
         self.start.evaluation_wanted.connect(self.windows.evaluate)
-        self.windows.open_requested.connect(self.open_session)
-        self.windows.resume_requested.connect(self.resume_session)
         self.live.ended.connect(self._on_ended)
         self.live.opened.connect(self._current.add_session)
         self.live.export_requested.connect(lambda: self.windows.export())

@@ -46,7 +46,6 @@ from handcal_gui.calibrate.guide.wizard import WizardPanel
 from handcal_gui.calibrate.start.start_page import StartPage
 from handcal_gui.widgets.banner import Banner
 from handcal_gui.widgets.layouts import fit_soon, scrollable, vbox
-from handcal_gui.widgets.placement import keep_on_screen
 
 Page = Literal["start", "live", "review"]
 Arrangement = Literal["panels", "station"]
@@ -194,7 +193,10 @@ class MainWindow(QMainWindow):
         self._leave_titles_to_tabs()
         self._find_least_size()
         if self.size() != size_px:  # Qt enlarges a window for its docks
-            keep_on_screen(self)
+            room, frame = self.screen().availableGeometry(), self.frameGeometry()
+            self.resize(self.size().boundedTo(room.size()))
+            left, top = room.right() - frame.width(), room.bottom() - frame.height()
+            self.move(max(room.left(), min(self.x(), left)), max(room.top(), min(self.y(), top)))
 
     @property
     def _docks_of_page(self) -> frozenset[str]:

@@ -32,6 +32,7 @@ from handcal_gui.evaluate.entries import CubeEntries
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.widgets.path_field import PathField
+from tests.gui.helpers import letters
 
 Kind = TypeVar("Kind", bound=QWidget)
 GRID_CAMERA = Intrinsics(634, 360, 900.0, 900.0, 316.5, 179.5, ())
@@ -316,3 +317,10 @@ def test_the_large_view_shows_the_image_alone_until_escape(
     QTest.keyClick(technician.dialog, Qt.Key.Key_Escape)
     assert technician.dialog.isVisible()
     assert technician.list.isVisible()
+
+
+def test_every_field_has_a_letter_of_its_own(
+    make: Callable[[CubeEntries], Technician], entries: CubeEntries
+) -> None:
+    found = letters(make(entries).dialog)
+    assert len(set(found)) == len(found) == 10

@@ -301,6 +301,12 @@ def test_a_sorted_or_filtered_table_keeps_what_is_selected(window: LibraryWindow
     assert [entry.wearer for entry in window.chosen] == ["Ada", "Ada", "Cid"]
 
 
+def test_every_button_has_a_letter_of_its_own(window: LibraryWindow) -> None:
+    texts = [one.text() for one in window.findChildren(QPushButton) if one.objectName() != "cancel"]
+    letters = [text[text.index("&") + 1].casefold() for text in texts]
+    assert len(set(letters)) == len(letters)
+
+
 def test_a_button_closes_it_and_leaves_the_others_their_room(
     qtbot: QtBot, window: LibraryWindow
 ) -> None:
