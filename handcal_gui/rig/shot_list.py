@@ -77,7 +77,8 @@ class ShotList(QTreeWidget):
         self.addTopLevelItems([_item(shot, shot.name in out) for shot in shots])
         self._mark_all()
         self.blockSignals(False)
-        self.setCurrentItem(self.topLevelItem(0))
+        if (first := self.topLevelItem(0)) is not None:
+            self.setCurrentItem(first)
 
     def show_results(
         self,
