@@ -24,7 +24,7 @@ from handcal.core.errors import HandcalError
 from handcal.io.files import make_folder
 from handcal.io.resources import resource_path
 from handcal.station.settings import StationSettings, with_source
-from handcal_gui.app.autopilot.demonstration import Demonstration
+from handcal_gui.app.autopilot import Demonstration
 from handcal_gui.app.preferences import PreferencesFile
 from handcal_gui.app.program import Program
 from handcal_gui.app.translation import tr

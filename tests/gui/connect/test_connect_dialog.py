@@ -26,8 +26,7 @@ from handcal.link.invitation import read_invitation
 from handcal.link.pairing import Pairings
 from handcal.link.server import HeadsetServer, PairingAttempts
 from handcal_gui.app.theme import SPACING_PX
-from handcal_gui.connect.connect_dialog import ConnectDialog
-from handcal_gui.connect.qr_code import QrCode
+from handcal_gui.connect.connect_dialog import ConnectDialog, QrCode
 from tests.gui.helpers import child, text
 
 DEVICE = "00000000000000aa"

@@ -25,12 +25,11 @@ from handcal.rig.boards.views import WorstView
 from handcal.rig.lens.uncertainty import ProjectionUncertainty
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.sim.photographs import BOARD
-from handcal_gui.rig.coverage_map import CoverageMap
 from handcal_gui.rig.images_panel import ImagesPanel
+from handcal_gui.rig.maps import CoverageMap, UncertaintyMap
 from handcal_gui.rig.project import RigProject
 from handcal_gui.rig.project_folder import ProjectFolder
 from handcal_gui.rig.solve import SolvedPart
-from handcal_gui.rig.uncertainty_map import UncertaintyMap
 from handcal_gui.widgets.drawing import Drawing
 from handcal_gui.widgets.image_view import ImageView
 from tests.gui.helpers import child
