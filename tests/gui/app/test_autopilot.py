@@ -7,6 +7,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from handcal.calibration.states import CalibrationSettings
@@ -29,7 +30,11 @@ def test_a_demonstration_calibrates_exports_and_takes_pictures(
     qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     codes: list[int] = []
-    application = SimpleNamespace(quit=lambda: codes.append(0), exit=codes.append)
+    kept = {
+        name: getattr(QApplication, name)
+        for name in ("sendPostedEvents", "activeModalWidget", "sendEvent")
+    }
+    application = SimpleNamespace(quit=lambda: codes.append(0), exit=codes.append, **kept)
     monkeypatch.setattr(autopilot, "QApplication", application)
     monkeypatch.setattr(autopilot, "_LOOK_S", 0.05)
     monkeypatch.setattr(autopilot, "_LOOK_MS", 60)
