@@ -278,12 +278,9 @@ def main() -> None:
 
 
 def _show_every_panel(program: Program) -> None:
-    """Move the panels hidden behind others to windows of their own."""
-    for i, name in enumerate(("fine_tune", "trials", "session", "link")):
-        dock = program.window.docks[name]
-        dock.setFloating(True)
-        dock.move(100 + 420 * i, 500)
-        dock.show()
+    """Open every section, and the wearer's view, which is the slowest of the tabs."""
+    for name in (*program.window.sections, "wearer_view"):
+        program.window.go_to(name)
 
 
 @contextmanager

@@ -14,7 +14,13 @@ from handcal.calibration.states import CalibrationSettings, Observation
 from handcal.calibration.timing.delay import DelayMeter
 from handcal.camera.clock import INFORM_NS
 from handcal.core.display import view_of_eye
-from handcal.core.errors import HandError, OutOfViewError, PoseError, PosePendingError
+from handcal.core.errors import (
+    HandError,
+    NoFrameError,
+    OutOfViewError,
+    PoseError,
+    PosePendingError,
+)
 from handcal.core.geometry import invert
 from handcal.core.types import EYES, Alignment, Eye, Float64, Rig
 from handcal.link.server import Confirmation, HeadsetServer
@@ -198,6 +204,8 @@ class Aligning:
                 "there.",
                 OUT_OF_VIEW,
             )
+        except NoFrameError as error:
+            return Refused(f"{error}. Confirm again.", "no image")
         except (HandError, PoseError) as error:
             was = error.what if isinstance(error, HandError) else ""
             return Refused(f"{error}. Align and confirm again.", "no hand", was=was)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -19,6 +19,7 @@ from handcal.core.geometry import invert
 from handcal.core.types import CameraIdentity, Float64, Frame, Intrinsics, Rig, UInt16
 from handcal.rig.compare import compare_camera
 from handcal.rig.report import depth_finding, display_finding
+from handcal.session.facts import CameraUsed
 
 FROZEN_FRAMES = 4
 """Equal pictures in a row, after which the camera counts as frozen: noise changes every picture."""
@@ -47,10 +48,16 @@ class Evidence:
     rig : Rig
     earlier : sequence of Contradiction
         Evidence found before the session was interrupted.
+    used : CameraUsed, optional
+        The camera of a resumed session; frames of another one are not used.
     """
 
-    def __init__(self, rig: Rig, earlier: Sequence[Contradiction] = ()) -> None:
+    def __init__(
+        self, rig: Rig, earlier: Sequence[Contradiction] = (), used: CameraUsed | None = None
+    ) -> None:
         self._rig = rig
+        self._used = used
+        self._not_sessions = ""
         self._found = {one.name: one for one in earlier}
         self._camera: tuple[CameraIdentity, Intrinsics] | None = None
         self._last: Frame | None = None
@@ -86,6 +93,7 @@ class Evidence:
         if (identity, frame.depth_intrinsics) != self._camera:
             self._camera = identity, frame.depth_intrinsics
             differences = compare_camera(self._rig, identity, frame.depth_intrinsics)
+            self._not_sessions = self._compare_with_session(identity, frame.depth_intrinsics)
             if not is_used:
                 self._found.pop("other-camera", None)
             if differences:
@@ -97,6 +105,12 @@ class Evidence:
         last, self._last = self._last, frame
         is_equal = last is not None and _is_same(last.depth, frame.depth)
         self._equal = self._equal + 1 if is_equal else 0
+        if self._not_sessions:
+            return Contradiction(
+                "session-camera",
+                f"this session was made with another camera: {self._not_sessions}. Choose its "
+                "camera on the start page, or begin a new calibration",
+            )
         if self._equal < FROZEN_FRAMES:
             return None
         return Contradiction(
@@ -172,6 +186,18 @@ class Evidence:
         """Note that a confirmation was drawn as it was sent."""
         self._drawn_otherwise = 0
         self._found.pop("stale-headset", None)
+
+    def _compare_with_session(self, identity: CameraIdentity, intrinsics: Intrinsics) -> str:
+        """Return how a camera differs from that of the resumed session; empty if it does not."""
+        if self._used is None:
+            return ""
+        known = self._used.identity
+        if known.model and known.model != identity.model:
+            return f"{known.model}, not {identity.model or 'one without a name'}"
+        sessions = replace(
+            self._rig, depth_camera=known, depth_intrinsics=self._used.depth_intrinsics
+        )
+        return "; ".join(compare_camera(sessions, identity, intrinsics))
 
     def _add(self, name: str, text: str) -> None:
         self._found[name] = Contradiction(name, text)

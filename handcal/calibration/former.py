@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +19,13 @@ from handcal.calibration.solve_again import solve_again, stored_solve_settings
 from handcal.core.errors import FileError
 from handcal.core.types import EYES, Eye, Float64, Rig
 from handcal.register.prior import LearnedPrior, posterior, widened
-from handcal.session.session import Session
+from handcal.session.session import Session, SessionRecord
 
 SLIP_M = (0.002, 0.0015, 0.003)
 """Change of a headset's fit when the same wearer puts it on again, standard deviation along
 E's axes. As much as the simulated wearers differ; for a real headset it is not known."""
+LONGEST_WORN = timedelta(hours=2)
+"""Nobody can tell after this time without an event that the headset stayed where it was."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,6 +36,22 @@ class Former:
     """each (3,); φ that the headset rendered with last, solved or set by hand."""
     prior: LearnedPrior | None = None
     """Prior of the eyes after the headset was moved; None if there is no stored session."""
+
+
+def may_still_be_worn(record: SessionRecord, now: datetime | None = None) -> bool:
+    """Return whether the headset may still sit as when the session's last event was recorded.
+
+    If it does not, φ is no longer that of the eyes: another session begins from this one.
+    """
+    last = datetime.fromisoformat(record.events[-1].time)
+    return (now or datetime.now(UTC)) - last <= LONGEST_WORN
+
+
+def end_former(path: Path) -> None:
+    """Finish the session from which another one began; it is not offered to be resumed again."""
+    with Session(path) as session:
+        if not session.contents.is_finished:
+            session.finish()
 
 
 def read_former(path: Path, rig: Rig) -> Former:

@@ -8,7 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handcal.core.errors import HandError, OutOfViewError, PoseError, PosePendingError
+from handcal.core.errors import (
+    HandError,
+    NoFrameError,
+    OutOfViewError,
+    PoseError,
+    PosePendingError,
+)
 from handcal.core.geometry import transform
 from handcal.core.types import Float64, HandCloud
 
@@ -76,6 +82,7 @@ class RecentHands:
         self._unplaced: deque[tuple[HandCloud, int, Float64 | None]] = deque()
         self._missed: deque[tuple[int, HandError]] = deque()
         self._seen_ns = 0
+        self._frames_ns: deque[int] = deque()
 
     def add(
         self,
@@ -95,6 +102,7 @@ class RecentHands:
             The newest hand placed now, and the reason if none was.
         """
         self._seen_ns = t_host_ns
+        self._frames_ns.append(t_host_ns)
         if cloud is not None:
             self._unplaced.append((cloud, t_host_ns, T_W_D))
         elif missed_for is not None:
@@ -156,7 +164,8 @@ class RecentHands:
     def nearest(self, t_host_ns: int, tolerance_s: float) -> PlacedHand:
         """Return the hand nearest in time; HandError if none is within the tolerance.
 
-        OutOfViewError if the camera saw only a part of it then.
+        NoFrameError if there is no frame of that time either, and OutOfViewError if the camera saw
+        only a part of the hand then.
         """
         near = [
             hand for hand in self._placed if abs(hand.t_host_ns - t_host_ns) <= 1e9 * tolerance_s
@@ -165,6 +174,8 @@ class RecentHands:
             missed = min(self._missed, key=lambda one: abs(one[0] - t_host_ns), default=(0, None))
             if isinstance(missed[1], OutOfViewError):
                 raise OutOfViewError(str(missed[1]))  # the stored one must hold no traceback
+            if all(abs(one_ns - t_host_ns) > 1e9 * tolerance_s for one_ns in self._frames_ns):
+                raise NoFrameError("No camera image is of that moment: too few arrive")
             raise HandError("The camera did not see your hand")
         return min(near, key=lambda hand: abs(hand.t_host_ns - t_host_ns))
 
@@ -204,3 +215,5 @@ class RecentHands:
             self._unplaced.popleft()
         while self._missed and self._missed[0][0] < oldest_ns:
             self._missed.popleft()
+        while self._frames_ns and self._frames_ns[0] < oldest_ns:
+            self._frames_ns.popleft()

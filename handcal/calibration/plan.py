@@ -391,7 +391,7 @@ class Plan:
     def _takes(self) -> str:
         """Return what it would take to be accepted."""
         reasons = dict.fromkeys(one.reason for one in self._verdicts())
-        return "; ".join(reasons) or "nothing more is planned"
+        return " ".join(reasons) or "nothing more is planned"
 
     def _with_hand(self, name: StepName, eyes: tuple[Eye, ...], is_steady: bool) -> NextStep:
         """Return a step that needs a still hand and acknowledged projections."""

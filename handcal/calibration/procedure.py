@@ -182,7 +182,8 @@ class Calibration:
         self.raised: PlacedHand | None = None
         self.verifying: Verifying | None = None
         self.camera = CameraIdentity()
-        self.evidence = Evidence(self.rig, _earlier_evidence(record))
+        used = record.facts.camera if record.is_solvable else None
+        self.evidence = Evidence(self.rig, _earlier_evidence(record), used)
         self._session = session
         self._link = link
         self._settings = settings or CalibrationSettings()

@@ -171,7 +171,7 @@ COMMANDS: Mapping[str, Entry] = {
         "sessions",
     ),
     "export": Entry(
-        "Export a session: report, tables, calibration, clouds, and the session as one file.",
+        "Export sessions: report, tables, calibration, clouds, and the session as one file.",
         "sessions",
     ),
     "openxr": Entry("Give the calibrated eyes to every OpenXR program of this user.", _OPENXR),

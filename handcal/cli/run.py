@@ -119,6 +119,7 @@ _SHARE = number(float, 0.0, 1.0)
 def run(arguments: argparse.Namespace) -> None:
     """Calibrate one wearer without a window, for scripts and for testing headset apps."""
     from handcal.bridge.bridges import open_bridges
+    from handcal.register.verdict_words import VERDICT_WORDS
     from handcal.station.run import RunSettings, run_calibration
     from handcal.station.settings import StationSettings, with_gate, with_source
 
@@ -156,10 +157,10 @@ def run(arguments: argparse.Namespace) -> None:
     for eye, found in result["eyes"].items():
         shift, sigma = triple(found["shift_mm"]), triple(found["sigma_mm"])
         is_applied = "yes" if found["projection_acked"] else "no"
-        shown_table.add_row(eye, shift, sigma, found["verdict"], is_applied)
+        shown_table.add_row(eye, shift, sigma, VERDICT_WORDS[found["verdict"]], is_applied)
     console.print(shown_table)
     for eye, found in result["eyes"].items():
-        console.print(f"{eye}: {found['verdict']}: {found['reason']}", markup=False)
+        console.print(f"{eye}: {VERDICT_WORDS[found['verdict']]}: {found['reason']}", markup=False)
     if lost := result["link"]["given_up"]:
         listed = ", ".join(f"{name.replace('_', ' ')} {count}×" for name, count in lost.items())
         console.print(f"The headset never acknowledged: {listed}", markup=False)

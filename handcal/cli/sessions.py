@@ -46,6 +46,7 @@ def solve(arguments: argparse.Namespace) -> None:
     from handcal.calibration import solve_again
     from handcal.core.types import EyeDistance
     from handcal.register.results import results_json
+    from handcal.register.verdict_words import VERDICT_WORDS
     from handcal.session.session import Session
 
     eye_distance = None
@@ -67,11 +68,11 @@ def solve(arguments: argparse.Namespace) -> None:
             triple(1e3 * np.sqrt(np.diag(shift.covariance_m2))),
             f"{1e3 * shift.rms_m:.2f}",
             f"{100 * shift.inlier_ratio:.0f} %",
-            results.verdicts[eye].name,
+            VERDICT_WORDS[results.verdicts[eye].name],
         )
     console.print(shown_table)
     for eye, verdict in results.verdicts.items():
-        console.print(f"{eye}: {verdict.name}: {verdict.reason}")
+        console.print(f"{eye}: {VERDICT_WORDS[verdict.name]}: {verdict.reason}")
     if results.eye_distance_m is not None:
         console.print(f"Eye distance: {1e3 * results.eye_distance_m:.1f} mm")
     if measured := results.measured_eye_distance:
@@ -79,8 +80,12 @@ def solve(arguments: argparse.Namespace) -> None:
 
 
 @command(
-    arg("session", type=Path, help="session folder"),
-    folder_option("--output", "folder for the files (default: results/export/NAME)"),
+    arg("session", type=Path, nargs="+", help="session folder; several are also put together"),
+    folder_option(
+        "--output",
+        "folder for the files; of several, each has its own in it (default: results/export/NAME, "
+        "of several results/export/together)",
+    ),
     arg(
         "--format",
         action="append",
@@ -95,8 +100,9 @@ def solve(arguments: argparse.Namespace) -> None:
     ),
 )
 def export(arguments: argparse.Namespace) -> None:
-    """Export a session: report, tables, calibration, clouds, and the session as one file."""
+    """Export sessions: report, tables, calibration, clouds, and the session as one file."""
     from handcal.export.export import ExportSettings, export_session
+    from handcal.export.many import export_sessions
     from handcal.export.north_star import replace_configuration
     from handcal.session.session import Session
 
@@ -111,7 +117,19 @@ def export(arguments: argparse.Namespace) -> None:
         fail(str(error), 2)
     if arguments.into and "northstar" not in settings.formats:
         fail("--into is for --format northstar", 2)
-    record = Session.open(arguments.session)
+    if len(arguments.session) > 1:
+        if arguments.into:
+            fail("--into takes one session", 2)
+        folder = arguments.output or Path("results/export/together")
+        with show_progress() as progress:
+            made = export_sessions(arguments.session, folder, settings, progress)
+        for file in made.files:
+            console.print(str(file), markup=False)
+        console.print(made.sentence, markup=False)
+        if made.missing:
+            fail(f"not exported: {', '.join(made.missing)}", 1)
+        return
+    record = Session.open(arguments.session[0])
     _say_what_is_left_out(record)
     folder = arguments.output or Path("results/export") / record.path.absolute().name
     with show_progress() as progress:

@@ -23,6 +23,7 @@ from handcal.cli.terminal import (
 )
 from handcal.core.types import Eye, VerdictName
 from handcal.io.files import make_folder
+from handcal.register.verdict_words import VERDICT_WORDS
 from handcal.station.faults import Fault
 
 if TYPE_CHECKING:
@@ -129,10 +130,12 @@ def demo(arguments: argparse.Namespace) -> None:
     shown_table = table("eye", "φ solved, mm", "± σ, mm", "true φ, mm", "error, mm", "verdict")
     for eye, found in result["eyes"].items():
         triples = [triple(found[key]) for key in ("shift_mm", "sigma_mm", "true_shift_mm")]
-        shown_table.add_row(eye, *triples, f"{found['error_mm']:.1f}", found["verdict"])
+        shown_table.add_row(
+            eye, *triples, f"{found['error_mm']:.1f}", VERDICT_WORDS[found["verdict"]]
+        )
     console.print(shown_table)
     for eye, found in result["eyes"].items():
-        console.print(f"{eye}: {found['verdict']}: {found['reason']}")
+        console.print(f"{eye}: {VERDICT_WORDS[found['verdict']]}: {found['reason']}")
     if used := result["eye_distance"]["used"]:
         console.print(f"Eye distance measured: {EyeDistance(**used)} ({used['source']})")
     for eye, found in result["eyes"].items():
@@ -187,7 +190,7 @@ def meanings(
     for eye, verdict in verdicts.items():
         eyes_by_verdict.setdefault(verdict, []).append(eye)
     return [
-        f"{'Both eyes' if len(eyes) > 1 else f'The {eyes[0]} eye'}, {verdict}: "
+        f"{'Both eyes' if len(eyes) > 1 else f'The {eyes[0]} eye'}, {VERDICT_WORDS[verdict]}: "
         f"{_MEANINGS[verdict]} {_next_step(verdict, settings, session)}"
         for verdict, eyes in eyes_by_verdict.items()
     ]

@@ -37,6 +37,10 @@ class HandError(HandcalError):
     """No hand could be segmented in a frame; the text says why."""
 
 
+class NoFrameError(HandError):
+    """No frame is of the time at which a hand is looked for."""
+
+
 class OutOfViewError(HandError):
     """The camera sees only a part of the hand, which must be held elsewhere."""
 

@@ -19,9 +19,10 @@ from handcal.core.conventions import (
     unity_camera,
 )
 from handcal.core.types import EYES, Eye, Projection
-from handcal.export.outcome import SessionOutcome, ShiftOrigin, printable
+from handcal.export.outcome import SessionOutcome, printable
 from handcal.io.files import write_atomic, write_json
 from handcal.rig.rig_file import quoted
+from handcal.session.drawn import ShiftKind
 
 CALIBRATION_VERSION = 1
 
@@ -33,20 +34,20 @@ def write_calibration_yaml(path: Path, outcome: SessionOutcome) -> None:
     for name, text in _whose(outcome).items():
         storage.write(name, quoted(text))
     for eye in EYES:
-        display, final = outcome.record.rig.eyes[eye], outcome.final(eye)
+        display, drawn = outcome.record.rig.eyes[eye], outcome.drawn[eye]
         storage.startWriteStruct(eye, cv2.FileNode_MAP)
-        storage.write("final", quoted(final))
-        storage.write("is_applied", int(outcome.is_applied(eye, final)))
-        storage.write("P", outcome.projection(eye, final).P)
+        storage.write("final", quoted(drawn.kind))
+        storage.write("is_applied", int(drawn.is_drawn))
+        storage.write("P", outcome.projection(eye).P)
         storage.write("K", display.K)
         storage.write("H0", display.H0)
         storage.write("t_C0_V_m", display.t_C0_V_m[:, None])
         storage.write("z_C0_S_m", display.z_C0_S_m)
         storage.write("width_px", display.width_px)
         storage.write("height_px", display.height_px)
-        storage.write("shift_m", outcome.final_shift_m(eye)[:, None])
-        for origin, shift_m in outcome.shifts_m[eye].items():
-            storage.write(f"{origin}_shift_m", shift_m[:, None])
+        storage.write("shift_m", drawn.shift_m[:, None])
+        for kind, shift_m in outcome.shifts_m[eye].items():
+            storage.write(f"{kind.replace(' ', '_')}_shift_m", shift_m[:, None])
         if outcome.results is not None and eye in outcome.results.eyes:
             storage.write("solved_covariance_m2", outcome.results.eyes[eye].covariance_m2)
         storage.endWriteStruct()
@@ -87,6 +88,7 @@ def _whose(outcome: SessionOutcome) -> dict[str, str]:
         "wearer": printable(outcome.record.wearer),
         "started_utc": outcome.started,
         "rig": outcome.record.rig.name,
+        "simulated": outcome.record.simulated,
         "handcal_version": version("handcal"),
     }
 
@@ -94,7 +96,7 @@ def _whose(outcome: SessionOutcome) -> dict[str, str]:
 def _eye(outcome: SessionOutcome, eye: Eye, near_m: float, far_m: float) -> dict[str, Any]:
     display = outcome.record.rig.eyes[eye]
     return {
-        "final": outcome.final(eye),
+        "final": outcome.drawn[eye].kind,
         "width_px": display.width_px,
         "height_px": display.height_px,
         "opencv": {
@@ -106,28 +108,28 @@ def _eye(outcome: SessionOutcome, eye: Eye, near_m: float, far_m: float) -> dict
         },
         "opengl": {"view_from_head": opengl_transform(display.T_V_H).tolist()},
         "calibrations": {
-            origin: _solution(outcome, eye, origin, near_m, far_m)
-            for origin in outcome.shifts_m[eye]
+            kind: _solution(outcome, eye, kind, near_m, far_m) for kind in outcome.shifts_m[eye]
         },
     }
 
 
 def _solution(
-    outcome: SessionOutcome, eye: Eye, origin: ShiftOrigin, near_m: float, far_m: float
+    outcome: SessionOutcome, eye: Eye, kind: ShiftKind, near_m: float, far_m: float
 ) -> dict[str, Any]:
-    projection = outcome.projection(eye, origin)
+    projection = outcome.projection(eye, kind)
     clip = opengl_projection(projection, near_m, far_m).tolist()
     unity = unity_camera(projection, outcome.record.rig.eyes[eye].T_V_H, near_m, far_m)
     found: dict[str, Any] = {
-        "is_applied": outcome.is_applied(eye, origin),
-        "shift_m": outcome.shifts_m[eye][origin].tolist(),
+        "is_applied": outcome.is_applied(eye, kind),
+        "shift_m": outcome.shifts_m[eye][kind].tolist(),
     }
-    if origin == "solved" and outcome.results is not None:
-        verdict = outcome.results.verdicts[eye]
+    if kind == "solved" and outcome.results is not None:
+        verdict, trials = outcome.results.verdicts[eye], outcome.trials.get(eye)
         found |= {
             "covariance_m2": outcome.results.eyes[eye].covariance_m2.tolist(),
             "verdict": verdict.name,
             "reason": verdict.reason,
+            "trials": asdict(trials) | {"is_over": trials.is_over} if trials else None,
             "by_distance": [asdict(one) for one in outcome.results.benefits[eye].by_distance],
         }
     return found | {

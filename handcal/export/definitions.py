@@ -10,17 +10,24 @@ DEFINITIONS = {
         "covers the registration and, if fused, how precisely people align. For an alignment by "
         "another method it is plain least squares with independent pairs, which is optimistic."
     ),
-    "fused": (
-        "All alignments combined, weighted by their covariances, with the prior: the size of the "
-        "eye box, and how far the φ of the two eyes differ."
+    "solved": (
+        "All alignments and verifications combined, weighted by their covariances, with the prior: "
+        "the size of the eye box, and how far the φ of the two eyes differ."
     ),
     "final, applied": (
-        "The final φ is the one tuned by hand if there is one, else the solved one. It is applied "
-        "if the headset acknowledged it and rendered with it at the end."
+        "The final φ of an eye is the one that the headset draws with, or will once it is sent: "
+        "solved, offline (zero), set by hand, or earlier (of results before the newest). It is "
+        "applied if the headset acknowledged it and rendered with it at the end."
+    ),
+    "verdict": (
+        "Good: accepted. Not yet: more alignments or verifications are needed. No better than "
+        "before: the offline calibration is kept. Impossible: the eye would lie where no eye is. "
+        "Contradicted: camera, headset or rig speak against the result. In CSV and JSON: accept, "
+        "repeat, keep, implausible, contradicted."
     ),
     "expected error": (
-        "Error in the display that φ's covariance predicts: root mean square at the corners of an "
-        "8 cm square straight ahead at half a metre, in arcminutes (′, a sixtieth of a degree)."
+        "Error in the display that φ's covariance predicts: mean over the corners of an 8 cm "
+        "square straight ahead at 0.4, 0.5 and 0.6 m, in arcminutes (′, a sixtieth of a degree)."
     ),
     "error in depth": (
         "Distance along the viewing direction by which an object at 0.5 m must move to cover its "

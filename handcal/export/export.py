@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from importlib import import_module
 from pathlib import Path
 
@@ -16,11 +18,12 @@ from handcal.export.formats import FORMATS, TOOL_FORMATS, Format
 from handcal.export.north_star import write_northstar
 from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.export.staging import Staging
-from handcal.export.tables import write_comparisons, write_parameters, write_trials
+from handcal.export.tables import table_rows, write_tables
 from handcal.export.tools import write_openxr, write_slicer, write_unity
 from handcal.session.session import SessionRecord
 
 _ALL = {**FORMATS, **TOOL_FORMATS}
+_NAME_CHARACTERS = 40
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +53,7 @@ def export_session(
     folder: Path,
     settings: ExportSettings,
     progress: Progress = Progress(),
+    collect: Callable[[SessionOutcome], object] = lambda _: None,
 ) -> tuple[Path, ...]:
     """Export a session into a folder, and return the files.
 
@@ -64,6 +68,8 @@ def export_session(
     settings : ExportSettings
     progress : Progress
         Reported to many times a second; while solving, before each alignment.
+    collect : callable, optional
+        Called with the session's outcome once its files are in place.
 
     Raises
     ------
@@ -80,7 +86,19 @@ def export_session(
             part.at(0.0)
             _write(name, outcome, staging.path, folder, settings, part)
         progress.at(1.0, "Moving the files in place")
-        return staging.publish([pattern for name in formats for pattern in _ALL[name].patterns])
+        files = staging.publish([pattern for name in formats for pattern in _ALL[name].patterns])
+    collect(outcome)
+    return files
+
+
+def export_name(record: SessionRecord) -> str:
+    """Return the name of the folder for a session's files: begun, local time, and the wearer."""
+    try:
+        begun = datetime.fromisoformat(record.events[0].time).astimezone()
+    except (ValueError, OverflowError):  # of a damaged journal
+        return record.path.absolute().name
+    wearer = re.sub(r"[^\w.-]+", "_", record.wearer)[:_NAME_CHARACTERS].strip("._")
+    return f"{begun:%Y-%m-%d-%H%M}-{wearer or 'not-named'}"
 
 
 def _part(progress: Progress, done: int, formats: Sequence[Format]) -> Progress:
@@ -108,7 +126,7 @@ def _write(
     """Write the files of one format, destined for `folder`, into `place`."""
     match name:
         case "report" | "html":
-            _import_drawing(progress)
+            import_drawing(progress)
             from handcal.export.report import session_report
             from handcal.report.html import write_html
             from handcal.report.pdf import write_pdf
@@ -119,9 +137,7 @@ def _write(
             else:
                 write_html(place / "report.html", report, progress)
         case "csv":
-            write_parameters(place / "parameters.csv", outcome)
-            write_trials(place / "trials.csv", outcome)
-            write_comparisons(place / "comparisons.csv", outcome)
+            write_tables(place, table_rows(outcome))
         case "yaml":
             write_calibration_yaml(place / "calibration.yaml", outcome)
         case "json":
@@ -142,7 +158,7 @@ def _write(
             write_slicer(place / "slicer", outcome, progress)
 
 
-def _import_drawing(progress: Progress) -> None:
+def import_drawing(progress: Progress) -> None:
     """Import what draws reports; where matplotlib first lists all fonts, that takes up to 20 s."""
     from matplotlib import get_cachedir
 

@@ -74,11 +74,11 @@ def draw_distances(axes: Sequence[Axes], results: Results) -> None:
 
 
 def draw_shifts(axes: Sequence[Axes], outcome: SessionOutcome, results: Results) -> None:
-    """Draw φ1, φ2 and φ3 of every alignment with ± σ, fused, and as set by hand."""
+    """Draw φ1, φ2 and φ3 of every alignment with ± σ, as solved, and if another, final."""
     count = len(results.alignments)
     room = max(1.0, 0.4 * count)  # for the names below
-    fused, tuned = count + room, count + 2.0 * room
-    is_tuned = any("fine_tuned" in outcome.shifts_m[eye] for eye in EYES)
+    fused, final = count + room, count + 2.0 * room
+    others = {eye: one for eye, one in outcome.drawn.items() if one.kind != "solved"}
     for component, ax in enumerate(axes):
         for eye in EYES:
             offset = -0.12 if eye == "left" else 0.12
@@ -100,16 +100,16 @@ def draw_shifts(axes: Sequence[Axes], outcome: SessionOutcome, results: Results)
                 capsize=2,
                 label=eye,
             )
-            if "fine_tuned" in outcome.shifts_m[eye]:
-                tuned_mm = 1e3 * outcome.shifts_m[eye]["fine_tuned"][component]
-                ax.plot(tuned + offset, tuned_mm, MARKERS[eye], color=COLORS[eye], mfc="none")
+            if eye in others:
+                final_mm = 1e3 * others[eye].shift_m[component]
+                ax.plot(final + offset, final_mm, MARKERS[eye], color=COLORS[eye], mfc="none")
         ax.axhline(0.0, color="0.7", linewidth=0.5, zorder=0)
         ax.axvline(count + 0.5, color="0.7", linewidth=0.5, linestyle=":", zorder=0)
         numbers = list(results.alignments)
         names: dict[float, str] = {
             index + 1: str(numbers[index]) for index in range(0, count, -(-count // 6))
         }
-        names |= {fused: "fused", tuned: "tuned"} if is_tuned else {fused: "fused"}
+        names |= {fused: "solved", final: "final"} if others else {fused: "solved"}
         ax.set_xticks(list(names), list(names.values()))
         ax.set_xlim(0.5, max(names) + 0.5 * room)
         name_axes(ax, f"φ{'₁₂₃'[component]}", "alignment", "mm")

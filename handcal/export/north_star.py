@@ -86,7 +86,11 @@ def write_northstar(folder: Path, outcome: SessionOutcome, into: Path | None = N
     up = float(np.arctan(np.abs(middle[1]) + half[1]))
     head = {
         "fov": [float(left), float(right), up, -up],
-        "handcal": {"session": outcome.name, "rig_from_head": T_H_N.tolist()},
+        "handcal": {
+            "session": outcome.name,
+            "simulated": outcome.record.simulated,
+            "rig_from_head": T_H_N.tolist(),
+        },
     }
     polynomials = {
         f"{eye}_uv_to_rect_{axis}": coefficients

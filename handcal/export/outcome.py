@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
 
 import numpy as np
 
 from handcal.calibration.solve_again import solve_sound, stored_solve_settings
 from handcal.core.display import projection_matrix
 from handcal.core.progress import Progress
-from handcal.core.types import EYES, Eye, Float64, Projection
+from handcal.core.types import Eye, Float64, Projection
+from handcal.register.benefit import expected_arcmin
 from handcal.register.results import Results, SolveSettings
+from handcal.session.drawn import DrawnShift, ShiftKind, drawn_shifts
+from handcal.session.judged_trials import EyeTrials, eye_trials
 from handcal.session.session import SessionRecord
 from handcal.session.trial import SAME_SHIFT_M
-
-ShiftOrigin: TypeAlias = Literal["fine_tuned", "solved", "offline"]
 
 _MAX_CHARACTERS = 1000
 
@@ -31,10 +31,26 @@ class SessionOutcome:
     """The session's own."""
     results: Results | None
     """All alignments solved again; None without alignments."""
-    shifts_m: Mapping[Eye, Mapping[ShiftOrigin, Float64]]
-    """each (3,); every known φ of an eye, the final one first: fine-tuned by hand if that changed
-    it, solved, and the zero of the offline calibration, which precedes the solved one if the
-    verdict is *keep*."""
+    drawn: Mapping[Eye, DrawnShift]
+    """The final φ of each eye."""
+
+    @property
+    def shifts_m(self) -> dict[Eye, dict[ShiftKind, Float64]]:
+        """Each (3,); every known φ of an eye: the final one first, then solved and offline."""
+        shifts_m: dict[Eye, dict[ShiftKind, Float64]] = {}
+        for eye, drawn in self.drawn.items():
+            shifts_m[eye] = {drawn.kind: drawn.shift_m}
+            if self.results is not None and eye in self.results.eyes:
+                shifts_m[eye].setdefault("solved", self.results.eyes[eye].shift_m)
+            shifts_m[eye].setdefault("offline", np.zeros(3))
+        return shifts_m
+
+    @property
+    def trials(self) -> dict[Eye, EyeTrials]:
+        """The user-test trials of the calibrated φ, of each eye that has some."""
+        if self.results is None:
+            return {}
+        return eye_trials(self.results, self.record, self.settings.verdict.target_arcmin)
 
     @property
     def name(self) -> str:
@@ -46,23 +62,27 @@ class SessionOutcome:
         """Time of the session's creation, UTC, ISO 8601."""
         return printable(self.record.events[0].time)
 
-    def final(self, eye: Eye) -> ShiftOrigin:
-        """Return the origin of the eye's final φ."""
-        return next(iter(self.shifts_m[eye]))
-
-    def final_shift_m(self, eye: Eye) -> Float64:
-        """Return the eye's final φ, (3,)."""
-        return self.shifts_m[eye][self.final(eye)]
-
-    def is_applied(self, eye: Eye, origin: ShiftOrigin) -> bool:
+    def is_applied(self, eye: Eye, kind: ShiftKind) -> bool:
         """Return whether the headset rendered with this φ of the eye at the end."""
         last_m = self.record.applied_shift_m.get(eye, np.zeros(3))
-        return bool(np.abs(last_m - self.shifts_m[eye][origin]).max() < SAME_SHIFT_M)
+        return bool(np.abs(last_m - self.shifts_m[eye][kind]).max() < SAME_SHIFT_M)
 
-    def projection(self, eye: Eye, origin: ShiftOrigin) -> Projection:
-        """Return the projection of an eye for one of its φ."""
+    def expected_arcmin(self, eye: Eye, kind: ShiftKind) -> float | None:
+        """Return the error expected of drawing with a φ of the eye; None if nothing is solved."""
+        if self.results is None or eye not in self.results.eyes:
+            return None
+        benefit, solved = self.results.benefits[eye], self.results.eyes[eye]
+        if kind == "solved":
+            return benefit.after_arcmin
+        if kind == "offline":
+            return benefit.without_arcmin
+        apart_m = solved.shift_m - self.drawn[eye].shift_m
+        return expected_arcmin(self.record.rig.eyes[eye], apart_m, solved.covariance_m2)
+
+    def projection(self, eye: Eye, kind: ShiftKind | None = None) -> Projection:
+        """Return the projection of an eye for one of its φ, by default the final one."""
         display = self.record.rig.eyes[eye]
-        P = projection_matrix(display, self.shifts_m[eye][origin])
+        P = projection_matrix(display, self.shifts_m[eye][kind or self.drawn[eye].kind])
         return Projection(eye, P, display.width_px, display.height_px)
 
 
@@ -82,27 +102,9 @@ def load_outcome(record: SessionRecord, progress: Progress = Progress()) -> Sess
     """
     settings = stored_solve_settings(record)
     record, results = solve_sound(record, settings, progress)
-    return SessionOutcome(
-        record, settings, results, {eye: _shifts_m(record, results, eye) for eye in EYES}
-    )
+    return SessionOutcome(record, settings, results, drawn_shifts(record, results))
 
 
 def printable(text: str) -> str:
     """Return an untrusted text as one line that is valid in every format."""
     return "".join(char if char.isprintable() else "\ufffd" for char in text[:_MAX_CHARACTERS])
-
-
-def _shifts_m(
-    record: SessionRecord, results: Results | None, eye: Eye
-) -> dict[ShiftOrigin, Float64]:
-    shifts_m: dict[ShiftOrigin, Float64] = {}
-    if results is not None and eye in results.eyes:
-        if results.verdicts[eye].name == "keep":
-            shifts_m["offline"] = np.zeros(3)
-        shifts_m["solved"] = results.eyes[eye].shift_m
-    shifts_m.setdefault("offline", np.zeros(3))
-    if record.fine_tuned is not None and eye in record.fine_tuned:
-        tuned_m = record.fine_tuned[eye]  # recorded of both eyes, and after an undo
-        if np.abs(tuned_m - next(iter(shifts_m.values()))).max() >= SAME_SHIFT_M:
-            return {"fine_tuned": tuned_m, **shifts_m}
-    return shifts_m

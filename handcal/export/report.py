@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from handcal.core.types import EYES, Alignment, Eye, EyeShift, Verdict, VerdictName
+from handcal.core.types import EYES, Alignment, Eye, EyeShift, Verdict, Verification
 from handcal.export import figures
 from handcal.export.definitions import DEFINITIONS
 from handcal.export.figure_rows import (
@@ -18,33 +20,24 @@ from handcal.export.figure_rows import (
     residual_rows,
 )
 from handcal.export.figures import ResidualCells
-from handcal.export.outcome import SessionOutcome, ShiftOrigin, printable
+from handcal.export.outcome import SessionOutcome, printable
 from handcal.export.tables import parameter_rows
 from handcal.export.trial_sections import (
     comparisons_section,
     trials_section,
     user_test_section,
 )
+from handcal.io.settings import settings_json
 from handcal.register.benefit import BY_DISTANCE
 from handcal.register.results import Results
-from handcal.report.cells import length_mm
+from handcal.register.verdict_words import VERDICT_WORDS
+from handcal.report.cells import length_mm, signed
 from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
 from handcal.report.provenance import at_minute, made_with, settings_items
 from handcal.session.comparison import read_comparisons
-from handcal.session.judged_trials import EyeTrials, eye_trials, is_doubted
-
-_ORIGINS: Mapping[ShiftOrigin, str] = {
-    "fine_tuned": "fine-tuned by hand",
-    "solved": "as solved",
-    "offline": "offline calibration",
-}
-_VERDICTS: Mapping[VerdictName, str] = {
-    "accept": "accepted",
-    "repeat": "not accepted yet",
-    "keep": "offline calibration kept",
-    "implausible": "implausible",
-    "contradicted": "contradicted",
-}
+from handcal.session.drawn import ShiftKind
+from handcal.session.judged_trials import EyeTrials, is_doubted
+from handcal.station.settings import StationSettings
 
 
 def session_report(outcome: SessionOutcome) -> Report:
@@ -52,15 +45,19 @@ def session_report(outcome: SessionOutcome) -> Report:
     return Report(
         title="Eye-display calibration",
         subject=f"{outcome.name} · {outcome.record.wearer or 'wearer not named'}",
-        lead=_verdict(outcome),
+        lead=_answer(outcome),
         sections=list(_sections(outcome)),
     )
 
 
 def _sections(outcome: SessionOutcome) -> Iterator[Section]:
     record, results = outcome.record, outcome.results
+    if results is not None:
+        yield _eyes(outcome, results)
     yield _summary(outcome)
     yield _shifts(outcome)
+    if any(_verifications(outcome, eye) for eye in EYES):
+        yield _verifications_section(outcome)
     if results is not None:
         yield _solution(results)
         yield _distances(results)
@@ -82,39 +79,128 @@ def _sections(outcome: SessionOutcome) -> Iterator[Section]:
     if links:
         title = f"Link to the headset, at {at_minute(links[-1].time)}"
         yield Section(title, settings_items(links[-1].data, "journal.jsonl"))
-    yield Section("Settings", settings_items(record.settings))
+    yield Section(
+        "Settings that differ from the defaults",
+        settings_items(record.settings, defaults=_default_settings()),
+    )
     yield Section("Definitions", [facts(DEFINITIONS)], starts_page=True)
 
 
-def _verdict(outcome: SessionOutcome) -> str:
-    """Return the verdict in one sentence, with what contradicts it in the trials."""
-    if outcome.results is None:
+def _answer(outcome: SessionOutcome) -> str:
+    """Return the verdict of each eye in a sentence, with its error."""
+    results = outcome.results
+    if results is None:
         return "Nothing is solved: the session holds no alignment."
-    trials = eye_trials(outcome.results, outcome.record, outcome.settings.verdict.target_arcmin)
-    parts = [
-        f"{eye} eye {_VERDICTS[verdict.name]}{_doubt(verdict, trials.get(eye))}: {verdict.reason}"
-        for eye, verdict in outcome.results.verdicts.items()
-    ]
-    set_since = [eye for eye in EYES if outcome.final(eye) == "fine_tuned"]
-    by_hand = outcome.record.set_by_hand_m
-    for how, eyes in (
-        ("fine-tuned by hand since", [eye for eye in set_since if eye in by_hand]),
-        ("set to another φ since, by going back", [eye for eye in set_since if eye not in by_hand]),
-    ):
-        if eyes:
-            parts.append(f"{' and '.join(eyes)} {how}")
-    sentence = "; ".join(parts)
-    return f"{sentence[0].upper()}{sentence[1:]}."
-
-
-def _doubt(verdict: Verdict, trials: EyeTrials | None) -> str:
-    """Return that an accepted eye's trials are over the lab's target; empty for others."""
-    if trials is None or not is_doubted(verdict.name, trials):
-        return ""
-    return (
-        f", but wrong by {trials.mean_arcmin:.1f} arcmin in its trials (n = {trials.count}), over "
-        f"the lab's target of {trials.target_arcmin:g} arcmin"
+    return " ".join(
+        f"{eye.capitalize()} eye: {verdict_text(verdict, outcome.trials.get(eye))}, "
+        f"{error_text(outcome, eye)}."
+        for eye, verdict in results.verdicts.items()
     )
+
+
+def verdict_text(verdict: Verdict, trials: EyeTrials | None) -> str:
+    """Return the word of a verdict, with what the trials of an accepted eye say against it."""
+    word = VERDICT_WORDS[verdict.name]
+    if trials is None or not is_doubted(verdict.name, trials):
+        return word
+    return (
+        f"{word}, but wrong by {trials.mean_arcmin:.1f}′ in its trials (n = {trials.count}; "
+        f"target {trials.target_arcmin:g}′)"
+    )
+
+
+def error_text(outcome: SessionOutcome, eye: Eye) -> str:
+    """Return the error of an eye's final φ, whether it was verified, and the error before."""
+    drawn = outcome.drawn[eye]
+    arcmin, before = (outcome.expected_arcmin(eye, kind) for kind in (drawn.kind, "offline"))
+    if arcmin is None:
+        return "not solved"
+    if drawn.kind == "offline":
+        return f"error {arcmin:.1f}′ expected with the offline calibration"
+    is_verified = outcome.results is not None and eye in outcome.results.verified
+    how = "verified by the wearer" if is_verified and drawn.kind == "solved" else "expected"
+    return f"error {arcmin:.1f}′ {how}, {before:.1f}′ before"
+
+
+def _eyes(outcome: SessionOutcome, results: Results) -> Section:
+    """Return the answer: each eye in a row, and why it is judged so."""
+    table = Table(
+        [
+            Column("eye", "left"),
+            Column("verdict", "left"),
+            Column("before, ′"),
+            Column("verification found, ′"),
+            Column("after, ′"),
+            Column("target, ′"),
+            Column("verifications"),
+            Column("trials"),
+            Column("final φ", "left"),
+        ],
+        [
+            [
+                eye,
+                VERDICT_WORDS[verdict.name],
+                f"{results.benefits[eye].without_arcmin:.1f}",
+                f"{verified.before_arcmin:.1f}" if (verified := results.verified.get(eye)) else "–",
+                f"{outcome.expected_arcmin(eye, outcome.drawn[eye].kind):.1f}",
+                f"{outcome.settings.verdict.target_arcmin:g}",
+                str(len(_verifications(outcome, eye))),
+                f"{trials.mean_arcmin:.1f}′, n = {trials.count}"
+                if (trials := outcome.trials.get(eye))
+                else "–",
+                str(outcome.drawn[eye]),
+            ]
+            for eye, verdict in results.verdicts.items()
+        ],
+    )
+    reasons = (
+        f"{eye.capitalize()} eye: {_reason(verdict, results.eyes[eye])}."
+        for eye, verdict in results.verdicts.items()
+    )
+    return Section("", [table, *reasons])
+
+
+def _verifications(outcome: SessionOutcome, eye: Eye) -> list[Verification]:
+    """Return the verifications of an eye, the oldest first."""
+    newest = outcome.record.facts.verified.get(eye)
+    return [*newest.earlier, newest] if newest else []
+
+
+def _verifications_section(outcome: SessionOutcome) -> Section:
+    table = Table(
+        [
+            Column("eye", "left"),
+            Column("no."),
+            Column("moved right, ′"),
+            Column("moved down, ′"),
+            Column("size, %"),
+            Column("φ before, mm"),
+            Column("φ that fitted, mm"),
+        ],
+        [
+            [
+                eye,
+                str(number),
+                *(
+                    signed(moved + aside, 1)
+                    for moved, aside in zip(each.nudge_arcmin, each.offset_arcmin, strict=True)
+                ),
+                signed(100 * (each.nudge_size + each.offset_size), 1),
+                *("\u00a0\u00a0".join(map(length_mm, m)) for m in (each.before_m, each.after_m)),
+            ]
+            for eye in EYES
+            for number, each in enumerate(_verifications(outcome, eye), 1)
+        ],
+        "How far the wearer moved the drawing until it covered the hand, at the hand's distance. "
+        "0 in all three: the wearer moved it back to where it was, or not at all.",
+    )
+    return Section("Verifications", [table])
+
+
+def _default_settings() -> dict[str, Any]:
+    """Return the settings of a session in which nothing was chosen, as they are stored."""
+    station = json.loads(json.dumps(settings_json(StationSettings()), default=str))
+    return {"calibration": station.pop("calibration"), "station": station}
 
 
 def _summary(outcome: SessionOutcome) -> Section:
@@ -129,6 +215,7 @@ def _summary(outcome: SessionOutcome) -> Section:
                     "Begun": at_minute(outcome.started),
                     "Rig": record.rig.name,
                     **({"Simulated": record.simulated} if record.simulated else {}),
+                    "Plan": record.facts.plan or "not recorded",
                     "Method": outcome.settings.method,
                     "Alignments": str(len(record.alignments)),
                     "Confirmations refused": str(record.refused),
@@ -155,14 +242,14 @@ def _shifts(outcome: SessionOutcome) -> Section:
         [
             [
                 eye,
-                _ORIGINS[origin],
-                *_shift_cells(outcome, eye, origin),
-                _yes(outcome.final(eye) == origin),
-                _yes(outcome.is_applied(eye, origin)),
+                kind,
+                *_shift_cells(outcome, eye, kind),
+                _yes(kind == outcome.drawn[eye].kind),
+                _yes(outcome.is_applied(eye, kind)),
             ]
             for eye in EYES
-            for origin in outcome.shifts_m[eye]
-            if origin != "offline" or outcome.final(eye) == origin
+            for kind in outcome.shifts_m[eye]
+            if kind != "offline" or outcome.drawn[eye].kind == kind
         ],
     )
     items: list[Item] = [table]
@@ -175,21 +262,13 @@ def _solution(results: Results) -> Section:
     table = Table(
         [
             Column("eye", "left"),
-            Column("verdict", "left"),
             Column("expected error, arcmin"),
             Column("RMS, mm"),
             Column("inliers, %"),
             Column("iterations"),
-            Column("reason", "left"),
         ],
         [
-            [
-                eye,
-                results.verdicts[eye].name,
-                f"{results.benefits[eye].after_arcmin:.1f}",
-                *_registered(shift),
-                _reason(results.verdicts[eye], shift),
-            ]
+            [eye, f"{results.benefits[eye].after_arcmin:.1f}", *_registered(shift)]
             for eye, shift in results.eyes.items()
         ],
     )
@@ -280,7 +359,7 @@ def _shift_plots(outcome: SessionOutcome, results: Results) -> Section:
         [
             Figure(
                 "shifts",
-                "Bars are ± σ. Hollow: set by hand, if there is one.",
+                "Bars are ± σ. Hollow: the final φ, if it is not the solved one.",
                 lambda axes: figures.draw_shifts(axes, outcome, results),
                 rows,
                 height_mm=58.0,
@@ -362,7 +441,7 @@ def _overlays(outcome: SessionOutcome) -> Section:
 
 def _overlay(outcome: SessionOutcome, eye: Eye, number: int, alignment: Alignment) -> Figure:
     display = outcome.record.rig.eyes[eye]
-    shifts_m = {"before": np.zeros(3), "after": outcome.final_shift_m(eye)}
+    shifts_m = {"before": np.zeros(3), "after": outcome.drawn[eye].shift_m}
     outlines = {
         when: figures.overlay_outlines(display, alignment, eye, shift_m)
         for when, shift_m in shifts_m.items()
@@ -377,10 +456,10 @@ def _overlay(outcome: SessionOutcome, eye: Eye, number: int, alignment: Alignmen
     return Figure(f"overlay-{eye}", "", draw, rows, height_mm=58.0, columns=2)
 
 
-def _shift_cells(outcome: SessionOutcome, eye: Eye, origin: ShiftOrigin) -> list[str]:
-    if origin == "solved" and outcome.results is not None:
+def _shift_cells(outcome: SessionOutcome, eye: Eye, kind: ShiftKind) -> list[str]:
+    if kind == "solved" and outcome.results is not None:
         return _with_sigma(outcome.results.eyes[eye])
-    return [length_mm(value) for value in outcome.shifts_m[eye][origin]]
+    return [length_mm(value) for value in outcome.shifts_m[eye][kind]]
 
 
 def _with_sigma(shift: EyeShift) -> list[str]:

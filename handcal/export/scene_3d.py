@@ -51,7 +51,7 @@ def _make_scene(outcome: SessionOutcome, number: int) -> Scene3d:
     eyes: dict[Eye, Eye3d] = {}
     for eye, T_E_W in alignment.T_E_W.items():
         corners_m = _display_corners_m(outcome.record.rig.eyes[eye])
-        points_m = np.vstack([np.zeros(3), outcome.final_shift_m(eye), corners_m])
+        points_m = np.vstack([np.zeros(3), outcome.drawn[eye].shift_m, corners_m])
         placed_m = transform(T_scene_W @ invert(T_E_W), points_m)
         eyes[eye] = Eye3d(placed_m[0], placed_m[1], placed_m[2:])
     shifts = outcome.results.alignments[number]

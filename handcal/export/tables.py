@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from handcal.core.types import EYES, Eye, EyeShift, Float64
-from handcal.export.outcome import SessionOutcome, ShiftOrigin
+from handcal.export.outcome import SessionOutcome
 from handcal.io.files import write_atomic
 from handcal.register.benefit import expected_error_arcmin
+from handcal.register.results import Results
 from handcal.report.rows import rows_csv
 from handcal.session.comparison import Comparison, read_comparisons
 from handcal.session.trial import Trial
 
-_WHOSE = ("session", "wearer")
+_WHOSE = ("session", "wearer", "begun_utc", "simulated")
 _PARAMETERS = (
     *_WHOSE,
     "source",
@@ -36,6 +37,16 @@ _PARAMETERS = (
     "expected_error_arcmin",
     "verdict",
     "reason",
+    "target_arcmin",
+    "before_arcmin",
+    "probability_better",
+    "depth_before_mm",
+    "depth_after_mm",
+    "verifications",
+    "verification_found_arcmin",
+    "trials",
+    "trials_mean_arcmin",
+    "trials_over_target",
     "eyes_open",
     "rotation_deg",
     *(f"drawn_phi{axis}_mm" for axis in (1, 2, 3)),
@@ -68,21 +79,47 @@ _COMPARISONS = (
 )
 
 
-def write_parameters(path: Path, outcome: SessionOutcome) -> None:
-    """Write each eye's φ: a row for every alignment, the fused φ and the one set by hand.
+_COLUMNS: Mapping[str, tuple[str, ...]] = {
+    "parameters.csv": _PARAMETERS,
+    "trials.csv": _TRIALS,
+    "comparisons.csv": _COMPARISONS,
+}
+TableRow: TypeAlias = Mapping[str, Any]
 
-    Columns: docs/export.md.
+
+def table_rows(outcome: SessionOutcome) -> dict[str, list[TableRow]]:
+    """Return the rows of each table of a session, by its file; columns: docs/export.md."""
+    record = outcome.record
+    whose = {
+        "session": outcome.name,
+        "wearer": record.wearer,
+        "begun_utc": outcome.started,
+        "simulated": record.simulated,
+    }
+    tables = {
+        "parameters.csv": parameter_rows(outcome),
+        "trials.csv": corner_rows(record.trials),
+        "comparisons.csv": _comparison_rows(read_comparisons(record.events)),
+    }
+    return {name: [{**whose, **row} for row in rows] for name, rows in tables.items()}
+
+
+def write_tables(folder: Path, tables: Mapping[str, Iterable[TableRow]]) -> None:
+    """Write the tables of one session or several, as `table_rows` gives them.
+
+    Blinded comparisons are written only if there are any. FileError if a file cannot be written.
     """
-    _write(path, _PARAMETERS, outcome, parameter_rows(outcome))
-
-
-def write_trials(path: Path, outcome: SessionOutcome) -> None:
-    """Write the user test: a row for every corner of every trial; columns: docs/export.md."""
-    _write(path, _TRIALS, outcome, corner_rows(outcome.record.trials))
+    for name, columns in _COLUMNS.items():
+        rows = list(tables[name])
+        if rows or name != "comparisons.csv":
+            write_atomic(folder / name, rows_csv(rows, columns))
 
 
 def parameter_rows(outcome: SessionOutcome) -> Iterator[dict[str, Any]]:
-    """Yield a row for every φ of each eye."""
+    """Yield a row for each eye of each alignment, and one for each known φ of each eye.
+
+    Exactly one row of each eye is final.
+    """
     record, results = outcome.record, outcome.results
     if results is not None:
         for number, shifts in results.alignments.items():
@@ -98,30 +135,38 @@ def parameter_rows(outcome: SessionOutcome) -> Iterator[dict[str, Any]]:
                     "rotation_deg": float(np.degrees(np.linalg.norm(alignment.rotation_rad))),
                     **_triple("drawn_phi{}_mm", 1e3 * alignment.drawn_shift_m[eye]),
                 }
-        for eye, shift in results.eyes.items():
-            verdict = results.verdicts[eye]
-            yield {
-                "source": "fused",
-                **_place(outcome, eye, "solved"),
-                **_solved(outcome, shift),
-                "expected_error_arcmin": results.benefits[eye].after_arcmin,
-                "verdict": verdict.name,
-                "reason": verdict.reason,
-            }
     for eye in EYES:
-        if "fine_tuned" in outcome.shifts_m[eye]:
+        for kind, shift_m in outcome.shifts_m[eye].items():
             yield {
-                "source": "fine-tuned",
-                **_place(outcome, eye, "fine_tuned"),
-                **_triple("phi{}_mm", 1e3 * outcome.shifts_m[eye]["fine_tuned"]),
+                "source": kind,
+                "eye": eye,
+                "final": _yes(kind == outcome.drawn[eye].kind),
+                "applied": _yes(outcome.is_applied(eye, kind)),
+                **_triple("phi{}_mm", 1e3 * shift_m),
+                **(_solved(outcome, results.eyes[eye]) if results and kind == "solved" else {}),
+                "expected_error_arcmin": outcome.expected_arcmin(eye, kind),
+                **(_judged(outcome, results, eye) if results and eye in results.eyes else {}),
             }
 
 
-def _place(outcome: SessionOutcome, eye: Eye, origin: ShiftOrigin) -> dict[str, Any]:
+def _judged(outcome: SessionOutcome, results: Results, eye: Eye) -> dict[str, Any]:
+    """Return what is known of an eye, whichever of its φ is final."""
+    verdict, benefit = results.verdicts[eye], results.benefits[eye]
+    verification = outcome.record.facts.verified.get(eye)
+    verified, trials = results.verified.get(eye), outcome.trials.get(eye)
     return {
-        "eye": eye,
-        "final": _yes(outcome.final(eye) == origin),
-        "applied": _yes(outcome.is_applied(eye, origin)),
+        "verdict": verdict.name,
+        "reason": verdict.reason,
+        "target_arcmin": outcome.settings.verdict.target_arcmin,
+        "before_arcmin": benefit.without_arcmin,
+        "probability_better": benefit.probability_better,
+        "depth_before_mm": 1e3 * benefit.depth.without_m,
+        "depth_after_mm": 1e3 * benefit.depth.after_m,
+        "verifications": 1 + len(verification.earlier) if verification else 0,
+        "verification_found_arcmin": verified.before_arcmin if verified else None,
+        "trials": trials.count if trials else 0,
+        "trials_mean_arcmin": trials.mean_arcmin if trials else None,
+        "trials_over_target": _yes(trials.is_over) if trials else None,
     }
 
 
@@ -149,13 +194,6 @@ def _registered(shift: EyeShift) -> dict[str, Any]:
         "converged": _yes(shift.converged),
         "stop_reason": shift.stop_reason,
     }
-
-
-def write_comparisons(path: Path, outcome: SessionOutcome) -> None:
-    """Write the blinded comparisons, if there are any; FileError if they cannot be written."""
-    comparisons = read_comparisons(outcome.record.events)
-    if comparisons:
-        _write(path, _COMPARISONS, outcome, _comparison_rows(comparisons))
 
 
 def _comparison_rows(comparisons: Sequence[Comparison]) -> Iterator[dict[str, Any]]:
@@ -205,10 +243,3 @@ def _triple(name: str, values: Float64) -> dict[str, float]:
 
 def _yes(truth: bool) -> str:
     return "yes" if truth else "no"
-
-
-def _write(
-    path: Path, columns: tuple[str, ...], outcome: SessionOutcome, rows: Iterable[Mapping[str, Any]]
-) -> None:
-    whose = {"session": outcome.name, "wearer": outcome.record.wearer}
-    write_atomic(path, rows_csv(({**whose, **row} for row in rows), columns))

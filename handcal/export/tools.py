@@ -38,11 +38,12 @@ def write_unity(path: Path, outcome: SessionOutcome, near_m: float, far_m: float
     values: dict[str, object] = {
         "handcalUnity": _VERSION,
         "session": outcome.name,
+        "simulated": outcome.record.simulated,
         "nearM": near_m,
         "farM": far_m,
     }
     for eye in EYES:
-        projection = outcome.projection(eye, outcome.final(eye))
+        projection = outcome.projection(eye)
         camera = unity_camera(projection, outcome.record.rig.eyes[eye].T_V_H, near_m, far_m)
         values[eye] = {
             "projection": camera.projection.ravel("F").tolist(),
@@ -74,7 +75,7 @@ def openxr_values(outcome: SessionOutcome) -> dict[str, object]:
     views = []
     for eye in EYES:
         try:
-            in_view, fov = openxr_view(outcome.projection(eye, outcome.final(eye)))
+            in_view, fov = openxr_view(outcome.projection(eye))
         except ValueError as error:
             raise FileError(f"{error} ({eye} eye)", "export json instead") from error
         own_fov = None
@@ -95,6 +96,7 @@ def openxr_values(outcome: SessionOutcome) -> dict[str, object]:
         "handcalOpenxr": _VERSION,
         "session": outcome.name,
         "wearer": outcome.record.wearer,
+        "simulated": outcome.record.simulated,
         "rig": rig.name,
         "headset": headset.name if headset else "",
         "space": "pose and own.pose are in the rig's head, inView in the runtime's view of the eye",
@@ -151,7 +153,7 @@ def write_slicer(folder: Path, outcome: SessionOutcome, progress: Progress = Pro
 
 def from_head(outcome: SessionOutcome, eye: Eye) -> Float64:
     """Return P (3, 4) of the final calibration, from the headset rig."""
-    P: Float64 = outcome.projection(eye, outcome.final(eye)).P @ outcome.record.rig.eyes[eye].T_V_H
+    P: Float64 = outcome.projection(eye).P @ outcome.record.rig.eyes[eye].T_V_H
     return P
 
 

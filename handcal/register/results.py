@@ -286,8 +286,8 @@ def results_json(results: Results) -> dict[str, Any]:
     }
 
 
-def read_rendered_shift_m(results: Mapping[str, Any] | None) -> dict[Eye, Float64]:
-    """Return φ as rendered, (3,), of each eye in what `results_json` made.
+def read_solved_shift_m(results: Mapping[str, Any] | None) -> dict[Eye, Float64]:
+    """Return φ as solved, (3,), of each eye in what `results_json` made.
 
     Eyes without three numbers are left out: results come from files, and None are no results.
     """
@@ -297,9 +297,16 @@ def read_rendered_shift_m(results: Mapping[str, Any] | None) -> dict[Eye, Float6
         one = eyes.get(eye) if isinstance(eyes, dict) else None
         if isinstance(one, dict):
             with suppress(TypeError, ValueError):
-                shift_m = np.array(one.get("shift_m"), np.float64).reshape(3)
-                found[eye] = shift_m if one.get("verdict") in USED else np.zeros(3)
+                found[eye] = np.array(one.get("shift_m"), np.float64).reshape(3)
     return found
+
+
+def read_rendered_shift_m(results: Mapping[str, Any] | None) -> dict[Eye, Float64]:
+    """Return φ as rendered, (3,), of each eye that `read_solved_shift_m` finds."""
+    return {
+        eye: shift_m if (results or {})["eyes"][eye].get("verdict") in USED else np.zeros(3)
+        for eye, shift_m in read_solved_shift_m(results).items()
+    }
 
 
 def _benefit_json(benefit: Benefit) -> dict[str, Any]:

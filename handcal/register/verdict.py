@@ -26,7 +26,7 @@ from handcal.register.fuse import Fused, Observation
 from handcal.register.prior import eye_position_m, eye_slice
 
 MOST_ALIGNMENTS = 10
-MISFIT = "drawing and hand differ in a way that no eye explains: check the rig's depth edges"
+MISFIT = "Drawing and hand differ in a way that no eye explains. Check the rig's depth edges."
 """Said of observations beyond what 95 % of usual wearers make."""
 # An eye whose calibration is as probably better as this is drawn with it, although not accepted.
 _LIKELY = 0.8
@@ -213,7 +213,7 @@ def judge(
     apart_m = eye_distance_m(rig, fused.shifts)
     if contradictions:
         return {
-            eye: Verdict("contradicted", "; ".join(dict.fromkeys(contradictions)))
+            eye: Verdict("contradicted", _sentences(*dict.fromkeys(contradictions)))
             for eye in fused.shifts
         }
     verdicts = {
@@ -240,19 +240,16 @@ def _with_evidence(verdict: Verdict, fused: Fused, eye: Eye, verified: Verified 
         if verdict.name == "accept":
             verdict = replace(verdict, name="repeat")
     if (apart_arcmin := fused.apart_arcmin.get(eye)) is not None:
-        reasons.append(f"two verifications of this eye are {apart_arcmin:.1f}′ apart")
+        reasons.append(f"Two verifications of this eye are {apart_arcmin:.1f}′ apart.")
     if verified is not None:
         size = f"{100 * verified.moved_size:+.1f}".replace("-", "\N{MINUS SIGN}")
-        changed = (
-            ""
-            if verdict.name == "keep"
-            else (f"; what is drawn has changed by {verified.changed_arcmin:.1f}′ since")
-        )
         reasons.append(
-            f"the wearer moved the drawing by {verified.moved_arcmin:.1f}′ and {size} % in "
-            f"size{changed}"
+            f"The wearer moved the drawing by {verified.moved_arcmin:.1f}′ and {size} % in size."
         )
-    return replace(verdict, reason="; ".join([*reasons, verdict.reason]))
+        if verdict.name != "keep":
+            changed = verified.changed_arcmin
+            reasons.append(f"What is drawn has changed by {changed:.1f}′ since.")
+    return replace(verdict, reason=" ".join([*reasons, verdict.reason]))
 
 
 def _fault(shift: EyeShift, apart_m: float | None, settings: VerdictSettings) -> Verdict | None:
@@ -261,30 +258,30 @@ def _fault(shift: EyeShift, apart_m: float | None, settings: VerdictSettings) ->
     if length_m > settings.eye_box_m:
         return Verdict(
             "implausible",
-            f"the eye would lie {1e3 * length_m:.0f} mm from the rig's viewpoint, beyond the "
-            f"{1e3 * settings.eye_box_m:.0f} mm eye box; check how the headset sits and the rig",
+            f"The eye would lie {1e3 * length_m:.0f} mm from the rig's viewpoint, beyond the "
+            f"{1e3 * settings.eye_box_m:.0f} mm eye box. Check how the headset sits, and the rig.",
         )
     if apart_m is not None and not (
         settings.eye_distance_min_m <= apart_m <= settings.eye_distance_max_m
     ):
         return Verdict(
             "implausible",
-            f"the eyes would lie {1e3 * apart_m:.0f} mm apart; "
-            "check the rig, or align one eye at a time",
+            f"The eyes would lie {1e3 * apart_m:.0f} mm apart. "
+            "Check the rig, or align one eye at a time.",
         )
     if not shift.converged:
-        return Verdict("repeat", f"the registration did not converge ({shift.stop_reason})")
+        return Verdict("repeat", f"The registration did not converge ({shift.stop_reason}).")
     if shift.inlier_ratio < settings.inlier_ratio_min:
         return Verdict(
             "repeat",
-            f"only {100 * shift.inlier_ratio:.0f} % of the hand found its place on the cursor; "
-            "hold the hand in the cursor's shape",
+            f"Only {100 * shift.inlier_ratio:.0f} % of the hand found its place on the cursor. "
+            "Hold the hand in the cursor's shape.",
         )
     if shift.rms_m > settings.rms_max_m:
         return Verdict(
             "repeat",
-            f"hand and cursor differ by {1e3 * shift.rms_m:.1f} mm; "
-            "hold the hand in the cursor's shape",
+            f"Hand and cursor differ by {1e3 * shift.rms_m:.1f} mm. "
+            "Hold the hand in the cursor's shape.",
         )
     return None
 
@@ -294,8 +291,8 @@ def _judge_benefit(gain: Benefit, advice: Advice, more: str, settings: VerdictSe
     if _is_enough(gain.after_arcmin, gain.probability_better, settings):
         return Verdict(
             "accept",
-            f"expected error {gain.after_arcmin:.1f}′ instead of {gain.without_arcmin:.1f}′; "
-            f"{sure} sure to be better than none",
+            f"The expected error is {gain.after_arcmin:.1f}′ instead of "
+            f"{gain.without_arcmin:.1f}′. It is {sure} sure to be better than no calibration.",
         )
     is_soon_accepted = advice.is_accepted and advice.alignments <= _FEW_ALIGNMENTS
     if gain.without_arcmin <= gain.after_arcmin or (
@@ -305,19 +302,31 @@ def _judge_benefit(gain: Benefit, advice: Advice, more: str, settings: VerdictSe
     ):
         return Verdict(
             "keep",
-            f"the offline calibration is expected to err by only {gain.without_arcmin:.1f}′ here; "
-            f"this result, expected at {gain.after_arcmin:.1f}′, is only {sure} sure to be "
-            "better",
+            f"The offline calibration is expected to err by only {gain.without_arcmin:.1f}′ here. "
+            f"This result is expected to err by {gain.after_arcmin:.1f}′. It is only {sure} sure "
+            "to be better.",
         )
-    now = f"expected error {gain.after_arcmin:.1f}′, {sure} sure to be better than none"
+    now = [f"The expected error is {gain.after_arcmin:.1f}′."]
+    if gain.after_arcmin > settings.target_arcmin:
+        now.append(f"The target is {settings.target_arcmin:g}′.")
+    now.append(f"It is {sure} sure to be better than no calibration.")
     if gain.probability_better < settings.probability_min:
-        now += f" ({percent(settings.probability_min)} needed)"
-    then = f"{advice.after_arcmin:.1f}′ expected after {more}"
+        now.append(f"{percent(settings.probability_min)} are needed.")
+    return Verdict("repeat", " ".join([*now, *_foreseen(gain, advice, more, settings)]))
+
+
+def _foreseen(gain: Benefit, advice: Advice, more: str, settings: VerdictSettings) -> list[str]:
+    """Return what further steps are expected to change: only what they improve."""
+    then = []
+    if gain.after_arcmin > settings.target_arcmin and advice.after_arcmin < gain.after_arcmin:
+        only = "" if advice.meets_target else "only "
+        then.append(f"{only}{advice.after_arcmin:.1f}′")
+    if gain.probability_better < settings.probability_min and advice.meets_target:
+        then.append(f"{percent(advice.probability_better)} certainty")
+    found = [f"After {more}, {' and '.join(then)} can be expected."] if then else []
     if not advice.meets_target:
-        return Verdict("repeat", f"{now}; only {then}: enter the eye distance, or verify each eye")
-    if not advice.is_accepted:
-        then += f", {percent(advice.probability_better)} sure"
-    return Verdict("repeat", f"{now}; {then}")
+        found.append("Enter the eye distance, or verify each eye.")
+    return found
 
 
 def _further_text(fused: Fused, advice: Advice, eye: Eye) -> str:
@@ -330,6 +339,10 @@ def _further_text(fused: Fused, advice: Advice, eye: Eye) -> str:
         is_again = set(fused.shifts) <= set(fused.verified)
         steps.append("verifying this eye again" if is_again else "verifying each eye")
     return ", then ".join(steps)
+
+
+def _sentences(*texts: str) -> str:
+    return " ".join(f"{text[:1].upper()}{text[1:].rstrip('.')}." for text in texts)
 
 
 def _is_enough(after_arcmin: float, probability_better: float, settings: VerdictSettings) -> bool:

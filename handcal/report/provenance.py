@@ -26,9 +26,17 @@ def made_with() -> dict[str, str]:
     }
 
 
-def settings_items(settings: Mapping[str, Any], file: str = "settings.json") -> list[Item]:
-    """Return nested settings as a table, with the number of further ones in `file`."""
-    rows = _flat(settings)
+def settings_items(
+    settings: Mapping[str, Any], file: str = "settings.json", defaults: Mapping[str, Any] = {}
+) -> list[Item]:
+    """Return nested settings that are not the defaults as a table.
+
+    Below it stands how many more `file` has.
+    """
+    usual = dict(_flat(defaults))
+    rows = [(name, value) for name, value in _flat(settings) if usual.get(name) != value]
+    if not rows:
+        return ["All settings are the defaults."]
     items: list[Item] = [facts(dict(rows[:_MAX_SETTINGS]))]
     if len(rows) > _MAX_SETTINGS:
         items.append(f"and {len(rows) - _MAX_SETTINGS:,} more, in {file}")

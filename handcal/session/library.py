@@ -3,31 +3,44 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Collection, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
+
+import numpy as np
 
 from handcal.core.errors import FileError
 from handcal.core.progress import Progress
 from handcal.core.types import EYES, Eye
 from handcal.io.files import make_folder, read_limited, sync_folder
 from handcal.io.lock import FileLock
-from handcal.register.results import read_rendered_shift_m
+from handcal.register.benefit import expected_arcmin
+from handcal.register.results import read_rendered_shift_m, read_solved_shift_m
 from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
+from handcal.session.comparison import COMPARED
+from handcal.session.drawn import DrawnShift, drawn_shifts
 from handcal.session.journal import JOURNAL, find_journals
 from handcal.session.judged_trials import EyeTrials, judge_trials
 from handcal.session.record import (
     MAX_ALIGNMENT_BYTES,
+    MAX_NOTES_CHARACTERS,
+    Replayed,
     alignment_path,
     replay,
     sha256,
+    simulated_parts,
 )
 from handcal.session.session import Session
-from handcal.session.state import SessionEvent, SessionState, clean_wearer
+from handcal.session.state import VERIFYING, SessionEvent, SessionState, clean_wearer
 from handcal.session.trial import trial_errors_arcmin
 
+_NOTES_CHARACTERS = 200
+_DONE = {SessionEvent.NOTES_SAVED, COMPARED, VERIFYING}
+"""Events that speak against an empty session."""
 DELETED = ".deleted"
 """Folder, inside the folder of sessions, to which deleted sessions are moved."""
 
@@ -40,13 +53,15 @@ class EyeOutcome:
     before_arcmin: float | None
     """Error that is expected without the calibration."""
     expected_arcmin: float | None
-    """Error with the calibrated φ: an eye that keeps the offline calibration has that before."""
+    """Error expected with the final φ: the offline calibration has that before."""
     remaining_arcmin: float | None
-    """Error after the wearer's verification; None if the calibrated φ was not verified."""
+    """Error after the wearer's verification; None if the final φ was not verified."""
     found_arcmin: float | None = None
-    """Error that the verification found, and corrected."""
+    """Error that the verification found, whether its result is used or not."""
     trials: EyeTrials | None = None
     """Those of the calibrated φ; None without any."""
+    final: str = ""
+    """The final φ in words, as `handcal.session.drawn.DrawnShift` gives it; empty if unknown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,11 +81,19 @@ class LibraryEntry:
     rig: str = ""
     headset: str = ""
     """Names; empty if unknown."""
+    plan: str = ""
+    eye_distance_m: float | None = None
+    """Measured, or solved; None if unknown."""
+    notes: str = ""
+    is_simulated: bool = False
+    """True if a part of it was simulated."""
     eyes: Mapping[Eye, EyeOutcome] = field(default_factory=lambda: MappingProxyType({}))
     """Of the newest results, if they are those of all alignments."""
     alignments: int = 0
     trials: int = 0
     """Numbers of those that are not deleted."""
+    is_empty: bool = False
+    """True if nothing was done in it: no alignment, verification, trial or note, even deleted."""
     target_arcmin: float | None = None
     """Largest expected error that the lab accepts, as set in the session; None if unknown."""
     is_finished: bool = False
@@ -136,8 +159,15 @@ def correct_wearer(path: Path, name: str) -> None:
         session.correct_wearer(name)
 
 
-def delete_session(path: Path) -> Path:
+def delete_session(path: Path, at_ns: int | None = None) -> Path:
     """Move a session to the folder of deleted ones, and return its place there.
+
+    Parameters
+    ----------
+    path : Path
+    at_ns : int, optional
+        Time of the deletion, kept as that of the folder: sessions deleted together have the same,
+        by which `deleted_together` knows them after a restart.
 
     Raises
     ------
@@ -151,7 +181,11 @@ def delete_session(path: Path) -> Path:
     folder = path.absolute().parent
     bin_folder = make_folder(folder / DELETED, folder)
     names = (path.name, *(f"{path.name}-{number}" for number in range(2, 10_000)))
-    return _move(path, next(bin_folder / one for one in names if not (bin_folder / one).exists()))
+    place = _move(path, next(bin_folder / one for one in names if not (bin_folder / one).exists()))
+    if at_ns is not None:
+        with suppress(OSError):  # then it is restored alone
+            os.utime(place, ns=(at_ns, at_ns))
+    return place
 
 
 def restore_session(path: Path) -> Path:
@@ -174,6 +208,20 @@ def deleted_sessions(folder: Path) -> tuple[Path, ...]:
     """Return the deleted sessions of a folder, the most recently deleted one last."""
     found = [journal.parent for journal in find_journals(folder / DELETED)]
     return tuple(sorted(found, key=lambda path: (_changed_ns(path), path.name)))
+
+
+def deleted_together(deleted: Collection[Path]) -> tuple[Path, ...]:
+    """Return those of the `deleted_sessions` that were deleted with the last one."""
+    times = {path: _modified_ns(path) for path in deleted}
+    last = next(reversed(times.values()), None)
+    return tuple(path for path, at_ns in times.items() if at_ns == last)
+
+
+def _modified_ns(path: Path) -> int:
+    try:
+        return path.stat().st_mtime_ns
+    except OSError:  # another program has just restored it
+        return 0
 
 
 def _require_there(path: Path) -> None:
@@ -212,9 +260,14 @@ def _read(path: Path, stamp: tuple[int, int]) -> LibraryEntry:
         former_wearers=tuple(state.former_wearers),
         rig=_rig_name(path, state),
         headset=state.facts.headset.name if state.facts.headset else "",
+        plan=state.facts.plan or "",
+        eye_distance_m=_eye_distance_m(state),
+        notes=_notes(path, state),
+        is_simulated=bool(simulated_parts(state.settings or {})),
         eyes=MappingProxyType(eye_outcomes(state)),
         alignments=len(state.alignments.active),
         trials=len(state.trials.active),
+        is_empty=_is_empty(replayed),
         target_arcmin=_lab_target_arcmin(state.settings),
         is_finished=state.is_finished,
         is_repaired=any(one.name == SessionEvent.REPAIRED for one in replayed.journal.events),
@@ -231,9 +284,41 @@ def eye_outcomes(state: SessionState) -> dict[Eye, EyeOutcome]:
     errors = trial_errors_arcmin(trials, read_rendered_shift_m(results))
     target_arcmin = _lab_target_arcmin(state.settings)
     judged = judge_trials(errors, math.inf if target_arcmin is None else target_arcmin)
+    drawn = drawn_shifts(state)
+    solved = read_solved_shift_m(results)
     return {
-        eye: _outcome(eyes[eye], judged.get(eye)) for eye in EYES if isinstance(eyes.get(eye), dict)
+        eye: _outcome(eyes[eye], judged.get(eye), drawn[eye] if eye in solved else None)
+        if eye not in solved or drawn[eye].kind in ("solved", "offline")
+        else _moved_outcome(state, eye, eyes[eye], judged.get(eye), drawn[eye])
+        for eye in EYES
+        if isinstance(eyes.get(eye), dict)
     }
+
+
+def _is_empty(replayed: Replayed) -> bool:
+    """Return whether nothing was done in a session, so that nothing is lost without it."""
+    state = replayed.state
+    is_kept = state.alignments.last() or state.trials.last() or state.facts.verified
+    names = {event.name for event in replayed.journal.events}
+    return not (is_kept or replayed.damaged or names & _DONE)
+
+
+def _eye_distance_m(state: SessionState) -> float | None:
+    """Return the distance between the eyes as measured, else as solved."""
+    if state.facts.eye_distance is not None:
+        return state.facts.eye_distance.value_m
+    return _number((state.results or {}).get("eye_distance_m") if state.is_solved else None)
+
+
+def _notes(path: Path, state: SessionState) -> str:
+    """Return the notes in one line, without checking them; empty if there are none."""
+    if state.notes_sha256 in ((), ("",)):
+        return ""
+    try:
+        data = read_limited(path / "notes.txt", 4 * MAX_NOTES_CHARACTERS, path)
+    except FileError:
+        return ""
+    return " ".join(data.decode(errors="replace").split())[:_NOTES_CHARACTERS]
 
 
 def _damaged_files(path: Path, state: SessionState) -> int:
@@ -268,22 +353,42 @@ def _rig_name(path: Path, state: SessionState) -> str:
         return ""
 
 
-def _outcome(one: Mapping[str, Any], trials: EyeTrials | None) -> EyeOutcome:
+def _outcome(
+    one: Mapping[str, Any], trials: EyeTrials | None, drawn: DrawnShift | None
+) -> EyeOutcome:
     """Return an eye's result; whatever is missing or not a number is unknown."""
     benefit, measured = one.get("benefit"), one.get("measured_arcmin")
     verdict, expected = str(one.get("verdict", "")), benefit if isinstance(benefit, dict) else {}
     before_arcmin = _number(expected.get("without_arcmin"))
-    if verdict == "keep":  # whatever was solved and verified is not used
-        return EyeOutcome(verdict, before_arcmin, before_arcmin, None, None, trials)
     found, left = measured if isinstance(measured, list) and len(measured) == 2 else (None, None)
+    is_offline = verdict == "keep" if drawn is None else drawn.kind == "offline"
     return EyeOutcome(
         verdict,
         before_arcmin,
-        _number(expected.get("after_arcmin")),
-        _number(left),
+        before_arcmin if is_offline else _number(expected.get("after_arcmin")),
+        None if is_offline else _number(left),
         _number(found),
         trials,
+        str(drawn or ""),
     )
+
+
+def _moved_outcome(
+    state: SessionState,
+    eye: Eye,
+    one: Mapping[str, Any],
+    trials: EyeTrials | None,
+    drawn: DrawnShift,
+) -> EyeOutcome:
+    """Return the result of an eye whose final φ is neither the solved nor the offline one."""
+    expected = None
+    with suppress(ValueError, KeyError, TypeError):
+        display = parse_rig(state.rig.encode()).eyes[eye]
+        solved_m = np.array(one["shift_m"], np.float64)
+        covariance_m2 = np.array(one["covariance_m2"], np.float64).reshape(3, 3)
+        expected = expected_arcmin(display, solved_m - drawn.shift_m, covariance_m2)
+    outcome = _outcome(one, trials, drawn)
+    return replace(outcome, expected_arcmin=_number(expected), remaining_arcmin=None)
 
 
 def _number(value: object) -> float | None:

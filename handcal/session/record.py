@@ -97,11 +97,7 @@ class SessionRecord:
     @property
     def simulated(self) -> str:
         """Parts of the session that were simulated, in words; empty if all was real."""
-        station = self.settings.get("station")
-        if not isinstance(station, dict):
-            return ""
-        parts = (("source", "simulator", "camera"), ("headset", "virtual", "headset and wearer"))
-        return ", ".join(what for name, value, what in parts if station.get(name) == value)
+        return simulated_parts(self.settings)
 
     @property
     def refused(self) -> int:
@@ -120,6 +116,15 @@ class SessionRecord:
         counts = f"{len(self.alignments)} alignments, {len(self.trials)} trials"
         damaged = f", {len(self.damaged)} parts damaged" if self.damaged else ""
         return f"<SessionRecord {self.path}: {counts}{damaged}>"
+
+
+def simulated_parts(settings: Mapping[str, Any]) -> str:
+    """Return the parts that a session's settings simulate, in words; empty if all was real."""
+    station = settings.get("station")
+    if not isinstance(station, dict):
+        return ""
+    parts = (("source", "simulator", "camera"), ("headset", "virtual", "headset and wearer"))
+    return ", ".join(what for name, value, what in parts if station.get(name) == value)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

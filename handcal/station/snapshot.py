@@ -52,6 +52,8 @@ class Snapshot:
     """The drawing shown in a blinded comparison; None while there is none."""
     has_compared_both: bool = False
     """True once both drawings of the comparison have been shown."""
+    trial_eye: Eye | None = None
+    """The eye to which the target of a trial is shown, and whose φ is moved only for the trial."""
 
     @property
     def problem(self) -> str:

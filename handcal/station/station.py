@@ -11,7 +11,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import asdict
 from pathlib import Path
 
-from handcal.calibration.former import Former, read_former
+from handcal.calibration.former import Former, end_former, read_former
 from handcal.calibration.hands import PlacedHand
 from handcal.calibration.plan import NextStep, Plan, StepName
 from handcal.calibration.procedure import Calibration
@@ -121,6 +121,8 @@ class Station(Closable):
             if former is not None and resume is None:
                 self.session.save_facts(former=former.name)
                 self.session.save_fine_tuned(begun.shift_m)
+                with suppress(FileError):  # as on a read-only disk: it is only offered again
+                    end_former(former)
             self.calibration = Calibration(
                 self.session, self._link, settings.calibration, begun.shift_m
             )
@@ -232,6 +234,7 @@ class Station(Closable):
             views={} if self.trials.comparing.shown else dict(self._views.shown),
             comparing=self.trials.comparing.shown,
             has_compared_both=self.trials.comparing.has_seen_both,
+            trial_eye=next(iter(self.trials.target_E_m), None),
         )
 
     def watch(self, watcher: Callable[[Snapshot], object]) -> None:

@@ -24,6 +24,7 @@ from handcal_gui.calibrate.camera.panel import Mode
 from handcal_gui.calibrate.control.live import CalibrationController
 from handcal_gui.calibrate.guide.view import STEPS, WEARERS, Action, Step, WizardView
 from handcal_gui.calibrate.guide.wizard import WizardPanel
+from handcal_gui.calibrate.sections import TITLES
 from handcal_gui.calibrate.start.camera_settings import CameraSettingsDialog
 from handcal_gui.library.export_dialog import ExportDialog
 
@@ -307,17 +308,17 @@ class Tour(QObject):
         """Fine-tune φ, record trials, and save every panel and tab."""
         window = self._program.window
         yield from self._fine_tune()
-        for name, dock in window.docks.items():
-            dock.raise_()
+        for name in TITLES:
+            window.go_to(name)
             yield _LOOK_MS
-            picture = f"panel-{name.replace('_', '-')}"
-            self._save(picture, dock.widget())
-            for tabs in dock.findChildren(QTabWidget):
+            picture, panel = f"panel-{name.replace('_', '-')}", getattr(window.panels, name)
+            self._save(picture, panel)
+            for tabs in panel.findChildren(QTabWidget):
                 for i in range(tabs.count()):
                     tabs.setCurrentIndex(i)
                     yield _LOOK_MS
                     title = tabs.tabText(i).split(" (")[0].lower()
-                    self._save(f"{picture}-{title}", dock.widget())
+                    self._save(f"{picture}-{title}", panel)
                 tabs.setCurrentIndex(0)
         window.panels.camera.set_mode(Mode.BOTH)
         yield _LOOK_MS
@@ -410,7 +411,7 @@ class Tour(QObject):
     def _fine_tune(self) -> Walk:
         """Change φ, record trials with it, and reset it."""
         window, panel = self._program.window, self._program.window.panels.fine_tune
-        window.docks["fine_tune"].raise_()
+        window.go_to("fine_tune")
         yield _LOOK_MS
         for _ in range(_STEPS):
             _press(panel, Qt.Key.Key_Right)

@@ -10,7 +10,6 @@ from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractButton,
     QComboBox,
-    QDockWidget,
     QMainWindow,
     QMenu,
     QWidget,
@@ -124,7 +123,7 @@ def _is_of_another_window(action: QAction, window: QMainWindow) -> bool:
     """Return whether an action belongs to a dialog or another window, such as the manual."""
     owner = action.parent()
     while isinstance(owner, QWidget) and owner is not window:
-        if owner.isWindow() and not isinstance(owner, QMenu | QDockWidget):
+        if owner.isWindow() and not (isinstance(owner, QMenu) or owner.property("panel")):
             return True
         owner = owner.parent()
     return False
@@ -135,16 +134,24 @@ def _group(action: QAction) -> tuple[str, str]:
     for owner in action.associatedObjects():
         if isinstance(owner, QMenu):
             return owner.title().replace("&", ""), _IN_MENU
+    if title := panel_title(action):
+        if action.shortcutContext() is Qt.ShortcutContext.WindowShortcut:
+            return tr("Guide"), _IN_CALIBRATION
+        return title, _IN_PANEL
     parent = action.parent()
     while isinstance(parent, QWidget):
-        if isinstance(parent, QDockWidget):
-            if action.shortcutContext() is Qt.ShortcutContext.WindowShortcut:
-                return tr("Guide"), _IN_CALIBRATION
-            return parent.windowTitle(), _IN_PANEL
         if parent.objectName() == "wizard":
             return tr("Guide"), _IN_CALIBRATION
         parent = parent.parent()
     return _WINDOW, _EVERYWHERE
+
+
+def panel_title(action: QAction) -> str:
+    """Return the title of the panel that an action belongs to; empty if it belongs to none."""
+    owner = action.parent()
+    while owner is not None and not owner.property("panel"):
+        owner = owner.parent()
+    return "" if owner is None else str(owner.property("panel"))
 
 
 def native(keys: str | QKeySequence) -> str:

@@ -9,11 +9,11 @@ from importlib.metadata import version
 
 from PySide6.QtCore import QSize
 from PySide6.QtGui import QAction, QKeySequence
-from PySide6.QtWidgets import QDialog, QDockWidget, QMessageBox, QTextBrowser, QWidget
+from PySide6.QtWidgets import QDialog, QMessageBox, QTextBrowser, QWidget
 
 from handcal.core.errors import FileError
 from handcal.io.resources import resource_path
-from handcal_gui.app.keys import keys_by_group
+from handcal_gui.app.keys import keys_by_group, panel_title
 from handcal_gui.app.manual import show_manual
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
@@ -50,19 +50,16 @@ def add_edit_menu(window: MainWindow, find: Callable[[], object]) -> None:
             owner = action.parent()
             is_offered = action.objectName() in _EDITS and action.isEnabled()
             if is_offered and isinstance(owner, QWidget) and owner.isVisible():
-                menu.addAction(_edit_text(action, owner), action.trigger)
+                menu.addAction(_edit_text(action), action.trigger)
         menu.addSeparator()
         menu.addAction(search)
 
     menu.aboutToShow.connect(offer)
 
 
-def _edit_text(action: QAction, owner: QWidget) -> str:
+def _edit_text(action: QAction) -> str:
     """Return what an action does, in which panel, and its key there."""
-    panel: QWidget | None = owner
-    while panel is not None and not isinstance(panel, QDockWidget):
-        panel = panel.parentWidget()
-    where = action.text() if panel is None else panel.windowTitle()
+    where = panel_title(action) or action.text()
     key = action.shortcut().toString(QKeySequence.SequenceFormat.NativeText)
     return f"{_EDITS[action.objectName()]}: {where}\t{key}"  # after a tab, it is only shown
 

@@ -65,9 +65,9 @@ class Preferences:
     runs_itself: bool = True
     """True if steps run automatically, False if each waits for a person."""
     geometry: str = ""
-    live_layout: str = ""
-    review_layout: str = ""
-    """Geometry of the window and layouts of its docks on either page: Qt's state in base64."""
+    """Geometry of the window: Qt's state in base64."""
+    layout: str = ""
+    """The panels that the user has opened or folded, and the widths of their columns, as JSON."""
 
     def with_session(self, path: Path) -> Self:
         """Return a copy with a session as the newest."""

@@ -10,6 +10,7 @@ from PySide6.QtCore import QByteArray, QObject, QSize, Qt, QTimer
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication, QMessageBox
 
+from handcal.calibration.former import may_still_be_worn
 from handcal.calibration.plan import with_eyes
 from handcal.core.errors import FileError
 from handcal.session.session import Session
@@ -23,21 +24,21 @@ from handcal_gui.app.theme import use_theme
 from handcal_gui.app.translation import tr
 from handcal_gui.calibrate.camera.panel import CameraPanel
 from handcal_gui.calibrate.cloud.panel import CloudPanel
-from handcal_gui.calibrate.control.compare import Comparison
 from handcal_gui.calibrate.control.live import CalibrationController
 from handcal_gui.calibrate.control.review import ReviewController
-from handcal_gui.calibrate.docks import Panels
 from handcal_gui.calibrate.fine_tune.panel import FineTunePanel
+from handcal_gui.calibrate.guide.view import Action
 from handcal_gui.calibrate.guide.wizard import WizardPanel
 from handcal_gui.calibrate.results.panel import ResultsPanel
 from handcal_gui.calibrate.review_page import ReviewPage
 from handcal_gui.calibrate.rotation.panel import RotationPanel
+from handcal_gui.calibrate.sections import Panels
 from handcal_gui.calibrate.session.panel import SessionPanel
 from handcal_gui.calibrate.start.example import copy_example
-from handcal_gui.calibrate.start.start_page import StartPage
+from handcal_gui.calibrate.start.start_page import StartPage, ask_whether_worn
 from handcal_gui.calibrate.trials.panel import TrialsPanel
 from handcal_gui.calibrate.wearer_view.panel import WearerViewPanel
-from handcal_gui.calibrate.window import MainWindow, Page
+from handcal_gui.calibrate.window import MainWindow
 from handcal_gui.connect.link_panel import LinkPanel
 from handcal_gui.widgets.fields import plain_message
 from handcal_gui.widgets.sentence import sentence
@@ -85,9 +86,8 @@ class Program(QObject):
         self.wizard_panel = WizardPanel()
         review_page = ReviewPage()
         self.window = MainWindow(self.start, self.wizard_panel, review_page, panels)
-        comparison = Comparison(panels.results)
-        self.live = CalibrationController(self.window, self.wizard_panel, comparison)
-        self.review = ReviewController(self.window, review_page, comparison)
+        self.live = CalibrationController(self.window, self.wizard_panel)
+        self.review = ReviewController(self.window, review_page)
         self.windows = SeparateWindows(
             self.window,
             self.start,
@@ -121,7 +121,20 @@ class Program(QObject):
         self._run(lambda: Station(followed, wearer, pairings=self._current.pairings))
 
     def resume_session(self, path: Path) -> None:
-        """Resume a session, at the station that was used last or chosen since."""
+        """Resume a session with the headset still on, or begin another one from its result."""
+        try:
+            record = Session.open(path)
+        except FileError as error:
+            self.window.banner.show_message(str(error))
+            return
+        stayed_on: bool | None = True
+        if record.is_solvable:  # or nothing in it depends on how the headset sits
+            stayed_on = may_still_be_worn(record) and ask_whether_worn(self.window, record)
+        if stayed_on is None:
+            return
+        if not stayed_on:
+            self.begin_from(path)
+            return
         if not self._may_leave():
             return
         self.start.keep_entries(self._current)
@@ -182,12 +195,10 @@ class Program(QObject):
 
     def close(self) -> None:
         """Save the window's layout and end all running work; safe to call twice."""
-        layouts = self.window.layouts()
         self.start.keep_entries(self._current)
         self._current.change(
             geometry=self.window.saveGeometry().toBase64().toStdString(),
-            live_layout=layouts.get("live", ""),
-            review_layout=layouts.get("review", ""),
+            layout=self.window.layout_text(),
             fine_tune_step_m=self.window.panels.fine_tune.step_m,
             hidden_layers=self.window.panels.cloud.hidden_layers,
         )
@@ -208,15 +219,17 @@ class Program(QObject):
         self.start.evaluation_wanted.connect(self.windows.evaluate)
         self.live.ended.connect(self._on_ended)
         self.live.opened.connect(self._current.add_session)
-        self.live.export_requested.connect(lambda: self.windows.export())
-        self.live.next_wearer_requested.connect(self._show_next_wearer)
+        self.live.on = {
+            Action.EXPORT: self.windows.export,
+            Action.NEXT_WEARER: self._show_next_wearer,
+            Action.SLIPPED: self._begin_from_shown,
+        }
         self.review.opened.connect(self._current.add_session)
         self.review.failed.connect(self._on_ended)
         review_page.export_requested.connect(lambda: self.windows.export())
         review_page.openxr_requested.connect(lambda: self.windows.use_in_openxr())
         review_page.resume_requested.connect(self._resume_reviewed)
         review_page.again_requested.connect(self._begin_from_shown)
-        self.live.slipped.connect(self._begin_from_shown)
         review_page.close_requested.connect(self.show_start)
         self.wizard_panel.eyes_chosen.connect(lambda eyes: self._current.change(plan=eyes))
         self.wizard_panel.hold_changed.connect(
@@ -226,8 +239,8 @@ class Program(QObject):
             lambda chosen: self._current.change(arrangement=chosen)
         )
         panels = self.window.panels
-        panels.session.export_requested.connect(lambda: self.windows.export())
-        panels.session.inspect_requested.connect(self.windows.inspect)
+        panels.session.export_button.clicked.connect(lambda: self.windows.export())
+        panels.session.inspect_button.clicked.connect(lambda: self.windows.inspect())
         panels.link.new_key.clicked.connect(self._renew_key)
         panels.link.connect_headset.clicked.connect(self.windows.connect_headset)
         self._current.not_saved.connect(self.window.banner.show_message)
@@ -255,11 +268,7 @@ class Program(QObject):
         add_help_menu(self.window, self.windows.make_support_bundle)
 
     def _restore(self) -> Qt.WindowState:
-        """Restore the window as it was left, and return its state, which is set when all is done.
-
-        Of a hidden window that is maximized, Qt keeps each layout of docks that is restored, to
-        apply it later: with tab bars that are deleted meanwhile, which crashed.
-        """
+        """Restore the window as it was left, and return its state, to be set in the end."""
         preferences = self.preferences
         self.window.panels.fine_tune.set_step_m(preferences.fine_tune_step_m)
         self.window.panels.cloud.hide_layers(preferences.hidden_layers)
@@ -269,11 +278,7 @@ class Program(QObject):
             self.window.resize(screen.boundedTo(QSize(*FIRST_SIZE_PX)))
         state = self.window.windowState()
         self.window.setWindowState(Qt.WindowState.WindowNoState)
-        layouts: dict[Page, str] = {
-            "live": preferences.live_layout,
-            "review": preferences.review_layout,
-        }
-        self.window.restore_layouts({page: text for page, text in layouts.items() if text})
+        self.window.restore_layout(preferences.layout)
         self.window.use_arrangement(preferences.arrangement)
         return state
 

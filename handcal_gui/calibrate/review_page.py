@@ -10,12 +10,11 @@ from PySide6.QtWidgets import QFormLayout, QLabel, QWidget
 
 from handcal.core.types import Eye
 from handcal.register.results import Results
-from handcal.session.judged_trials import eye_trials
 from handcal.session.session import SessionRecord
 from handcal_gui.app.theme import SPACING_PX, font_px, scale_font
 from handcal_gui.app.translation import tr
 from handcal_gui.calibrate.parts.result_card import ResultCard
-from handcal_gui.calibrate.results.residuals_tab import ResidualsTab
+from handcal_gui.calibrate.results.residuals import ResidualsTab
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import button, main_button, paragraph
 from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
@@ -62,7 +61,7 @@ class ReviewPage(QWidget):
         self._facts = QFormLayout()
         self._facts.setHorizontalSpacing(2 * SPACING_PX)
         self._facts.setVerticalSpacing(SPACING_PX)
-        self._card = ResultCard()
+        self._card = ResultCard(is_explained=True)
         self.residuals = ResidualsTab()
         self._export = main_button("reviewExport", tr("E&xport…"))
         self._openxr = button("reviewOpenxr", tr("&Use in XR"))
@@ -120,8 +119,7 @@ class ReviewPage(QWidget):
         self._openxr.setEnabled(record.is_solvable)
         self._again.setEnabled(results is not None)
         self._task.setText(_EXPORT if record.is_solvable else _RESUME)
-        trials = eye_trials(results, record, target_arcmin) if results else {}
-        self._card.show_results(results, target_arcmin, trials)
+        self._card.show_results(results, record, target_arcmin)
         self._card.setVisible(results is not None)
         if results is not None:
             self.residuals.show_results(results, record.alignments)
@@ -147,7 +145,6 @@ class ReviewPage(QWidget):
     def _fit(self) -> None:
         viewport, layout = self.parentWidget() or self, self.layout()
         is_low = viewport.height() < _LOW * font_px()
-        self._card.show_details(not is_low)
         if layout is not None:
             layout.setSpacing(SPACING_PX if is_low else 2 * SPACING_PX)
         parts = self._title, self._task, self._facts, self._card, self._export

@@ -1,79 +1,65 @@
-"""The main window: pages in the middle, panels in docks around them, menus above, a bar below."""
+"""The main window: pages in the middle, panels on either side, menus above, a bar below."""
 
 from __future__ import annotations
 
-import base64
-from collections.abc import Callable, Mapping
+import json
+from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
-from math import inf
 from typing import Literal
 
-from PySide6.QtCore import QByteArray, QEvent, QObject, Qt, Signal
-from PySide6.QtGui import (
-    QAction,
-    QCloseEvent,
-    QKeyEvent,
-    QKeySequence,
-    QMouseEvent,
-    QResizeEvent,
-)
+from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtGui import QAction, QCloseEvent, QKeyEvent, QKeySequence, QResizeEvent
 from PySide6.QtWidgets import (
     QApplication,
-    QDockWidget,
     QMainWindow,
+    QScrollArea,
+    QSplitter,
     QStackedWidget,
     QWidget,
 )
 
+from handcal.station.snapshot import Snapshot
 from handcal_gui.app.keys import keep_focus_off_clicked_buttons, press
-from handcal_gui.app.theme import SPACING_PX, follow_theme, font_px
+from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
-from handcal_gui.calibrate.docks import (
-    TITLES,
-    Docks,
-    PanelLetters,
-    Panels,
-    arrange_docks,
-    has_columns,
-    hide_tabs,
-    leave_titles_to_tabs,
-    make_docks,
-    share_room,
-    widen_page,
-)
 from handcal_gui.calibrate.guide.action_bar import BottomStrip
 from handcal_gui.calibrate.guide.wizard import WizardPanel
+from handcal_gui.calibrate.sections import (
+    LEFT,
+    RIGHT,
+    TABS,
+    TITLES,
+    Panels,
+    Section,
+    Tabs,
+    column,
+    share_height,
+    with_content,
+)
 from handcal_gui.calibrate.start.start_page import StartPage
 from handcal_gui.widgets.banner import Banner
-from handcal_gui.widgets.layouts import fit_soon, scrollable, vbox
+from handcal_gui.widgets.layouts import scrollable, vbox
+from handcal_gui.widgets.placement import keep_on_screen
 
 Page = Literal["start", "live", "review"]
 Arrangement = Literal["panels", "station"]
-_SHARED, _OWN = 3, 2
-"""Versions of stored layouts: divided by the program, or by the user, who dragged a splitter."""
-_SMALL = 100.0, 57.5
-"""Width and height below which all docks of a window are tabs, in sizes of the font."""
-_SETTLED_MS = 100
-"""Time without a new size after which the panels share it: that takes as long as a resize."""
-_GUIDE = 40.0
-"""Width, in sizes of the font, that the guide needs at every step."""
-_REVIEW_PERCENT = 36
-"""Of a large window's width, for the page of a stored session with its residual map."""
+_SHARES = 0.25, 0.28
+"""Of the window's width, for the columns of panels; what the user drags replaces them."""
+_REVIEW = frozenset({"cloud", "results", "trials", "session"})
+"""Panels of a stored session."""
 _MENUS = {
     "File": tr("&File"),
     "Edit": tr("&Edit"),
     "View": tr("&View"),
     "Help": tr("&Help"),
 }
-_DOCKS_OF_PAGE: dict[Page, frozenset[str]] = {
-    "start": frozenset(),
-    "live": frozenset(TITLES),
-    "review": frozenset({"cloud", "results", "trials", "session"}),
-}
 
 
 class MainWindow(QMainWindow):
-    """Holds pages and panels and arranges them, whatever they show.
+    """Holds pages and panels, and opens the panels that have something to show.
+
+    What the user has opened or folded stays so.
 
     Parameters
     ----------
@@ -85,6 +71,8 @@ class MainWindow(QMainWindow):
     ----------
     menus : dict of str to QMenu
         File, Edit, View and Help.
+    sections : dict of str to Section
+        By the names of their panels; the other panels are in the tabs.
     closing : Signal()
         The window is about to close.
     arrangement_changed : Signal(str)
@@ -105,6 +93,28 @@ class MainWindow(QMainWindow):
         self.may_close: Callable[[], bool] = lambda: True
         self.panels = panels
         self.banner = Banner()
+        self.sections = {name: Section(name, getattr(panels, name)) for name in (*LEFT, *RIGHT)}
+        self.tabs = Tabs({name: getattr(panels, name) for name in TABS})
+        self._parts: dict[str, Section | Tabs] = {**self.sections, "tabs": self.tabs}
+        for name, one in self._parts.items():
+            one.asked.connect(partial(self._choose, name))
+        # Keys that work in the whole window work while their panel is folded, too.
+        self._far_reaching = {
+            name: [
+                action
+                for action in getattr(panels, name).actions()
+                if action.shortcutContext() is Qt.ShortcutContext.WindowShortcut
+            ]
+            for name in TITLES
+        }
+        for actions in self._far_reaching.values():
+            self.addActions(actions)
+        self._chosen: dict[str, bool] = {}  # open or folded by the user
+        self._opened: set[str] = set()  # as there was something to show
+        self._shares = list(_SHARES)
+        self._page: Page = "start"
+        self._arrangement: Arrangement = "panels"
+        self._guide = wizard
         self._pages: dict[Page, QWidget] = {"start": start, "live": wizard, "review": review}
         self._stack = QStackedWidget()
         for page in self._pages.values():
@@ -114,38 +124,23 @@ class MainWindow(QMainWindow):
         margins = (*3 * (gap_px,), 2)  # so that no message is on the line of the strip below
         pages = (self._stack, 1)
         self._middle = vbox(self.banner, pages, on=middle, margins=margins, spacing=gap_px)
-        self.setCentralWidget(middle)
+        self._columns = (
+            column(*(self.sections[name] for name in LEFT)),
+            column(*(self.sections[name] for name in RIGHT), self.tabs),
+        )
+        self._sides = tuple(map(_side, self._columns))
+        self._splitter = QSplitter(childrenCollapsible=False)
+        for i, part in enumerate((self._sides[0], middle, self._sides[1])):
+            self._splitter.addWidget(part)
+            self._splitter.setStretchFactor(i, int(part is middle))
+        self._splitter.splitterMoved.connect(self._keep_shares)
+        self.setCentralWidget(self._splitter)
         self._bar = wizard.bar
         self.setStatusBar(BottomStrip(self._bar))
-        self._docks = make_docks(self, panels)
-        PanelLetters(self._docks, self)
-        self._leave_titles_to_tabs = partial(leave_titles_to_tabs, self, self._docks)
-        self._titles_timer = fit_soon(self._leave_titles_to_tabs, self)
-        for dock in self._docks.values():
-            dock.installEventFilter(self)
-            dock.visibilityChanged.connect(self._titles_timer.start)
-            dock.dockLocationChanged.connect(self._titles_timer.start)
-            dock.topLevelChanged.connect(self._own_layout)
-        self._is_own, self._was_small, self._least_px = False, False, inf
-        self._share_soon = fit_soon(self._fit_panels, self)
-        self._share_soon.setInterval(_SETTLED_MS)
-        self._layouts: dict[Page, QByteArray] = {}
-        self._page: Page = "start"
-        self._arrangement: Arrangement = "panels"
-        self._guide = wizard
-        self._default_layouts: dict[bool, QByteArray] = {}
-        for is_small in (True, False):
-            arrange_docks(self, self._docks, is_small=is_small)
-            self._default_layouts[is_small] = self.saveState(_SHARED)
         self._make_menus()
+        wizard.add_switch(self._station)
         keep_focus_off_clicked_buttons(self)
         self.show_page("start")
-        follow_theme(self, self._titles_timer.start)
-
-    @property
-    def docks(self) -> Docks:
-        """The docks by the names of their panels."""
-        return self._docks
 
     @property
     def page(self) -> Page:
@@ -154,19 +149,18 @@ class MainWindow(QMainWindow):
 
     def use_arrangement(self, arrangement: Arrangement) -> None:
         """Arrange calibrations as panels around the guide, or as the guide only."""
-        self._keep_layout()
         self._arrangement = arrangement
         self._station.setChecked(arrangement == "station")
-        page, self._page = self._page, "start"
-        self.show_page(page)
+        self._arrange()
 
     def show_wearer(self, name: str) -> None:
         """Name the wearer whose session is shown in the title; empty for none."""
         self.setWindowTitle(tr("{} – handcal").format(name) if name else "handcal")
 
     def show_page(self, page: Page) -> None:
-        """Show a page with its docks, in the layout used last."""
-        self._keep_layout()
+        """Show a page with its panels."""
+        if page != self._page:
+            self._opened = set()
         self._page = page
         if page == "start":
             self.show_wearer("")
@@ -176,72 +170,51 @@ class MainWindow(QMainWindow):
         # to it, on the start page the space above the buttons.
         self._middle.insertWidget(int(page == "live"), self.banner)
         self._stack.setCurrentIndex(list(self._pages).index(page))
-        is_small = self._was_small = self._is_small()
-        self._guide.fill_window(self._arrangement == "station", is_small=is_small)
-        self._restore_layout(page, is_small=is_small)
-        for name, dock in self._docks.items():
-            belongs = name in self._docks_of_page
-            if not belongs:
-                dock.hide()
-            elif page not in self._layouts:
-                dock.show()
-            dock.toggleViewAction().setEnabled(belongs)
-            self._go_to[name].setEnabled(belongs)
-        if page not in self._layouts:
-            self._docks["results"].raise_()
-        self._share_room()
-        self._leave_titles_to_tabs()
-        self._find_least_size()
-        if self.size() != size_px:  # Qt enlarges a window for its docks
-            room, frame = self.screen().availableGeometry(), self.frameGeometry()
-            self.resize(self.size().boundedTo(room.size()))
-            left, top = room.right() - frame.width(), room.bottom() - frame.height()
-            self.move(max(room.left(), min(self.x(), left)), max(room.top(), min(self.y(), top)))
+        self._arrange()
+        if self.size() != size_px:  # Qt enlarges a window for what it shows
+            keep_on_screen(self)
 
-    @property
-    def _docks_of_page(self) -> frozenset[str]:
-        is_alone = self._page == "live" and self._arrangement == "station"
-        return frozenset() if is_alone else _DOCKS_OF_PAGE[self._page]
-
-    def bring_up(self, name: str) -> None:
-        """Raise a panel above those tabbed with it, unless one of them has the keyboard focus."""
-        dock, focus = self._docks.get(name), QApplication.focusWidget()
-        if dock is not None and name in self._docks_of_page:
-            others = self.tabifiedDockWidgets(dock)
-            if not any(focus and other.isAncestorOf(focus) for other in others):
-                dock.raise_()
+    def follow(self, snapshot: Snapshot) -> None:
+        """Open the sections that have something to show; the rotation only while it matters."""
+        filled = {name for name, has_content in with_content(snapshot).items() if has_content}
+        opened = (self._opened | filled) - ({"rotation"} - filled)
+        if opened != self._opened:
+            self._opened = opened
+            self._arrange()
 
     def go_to(self, name: str) -> None:
-        """Raise a panel and give it the keyboard focus, if it belongs to the page."""
-        if name in self._docks_of_page:
-            dock = self._docks[name]
-            dock.show()
-            dock.raise_()
-            dock.widget().setFocus(Qt.FocusReason.ShortcutFocusReason)
+        """Open a panel and give it the keyboard focus, if it belongs to the page."""
+        if name not in self._offered():
+            return
+        if name in TABS:
+            self.tabs.show_panel(name)
+        self._choose(name if name in self.sections else "tabs", True)
+        panel = getattr(self.panels, name)
+        panel.window().activateWindow()
+        panel.setFocus(Qt.FocusReason.ShortcutFocusReason)
 
     def reset_layout(self) -> None:
-        """Restore the default layout of the page's docks."""
-        self._layouts.pop(self._page, None)
-        self._least_px = inf
-        page, self._page = self._page, "start"  # so that the current layout is not saved
-        self.show_page(page)
+        """Open and fold the panels as at first, in columns as wide as at first."""
+        self._chosen, self._shares = {}, list(_SHARES)
+        for section in self.sections.values():
+            if section.isWindow():
+                section.set_apart(False)
+        self._chosen = {}
+        self._arrange()
 
-    def layouts(self) -> dict[Page, str]:
-        """Return the layout of every page as text, for `restore_layouts`."""
-        self._keep_layout()
-        return {
-            page: base64.b64encode(state.data()).decode() for page, state in self._layouts.items()
-        }
+    def layout_text(self) -> str:
+        """Return what the user has opened, folded and dragged as text, for `restore_layout`."""
+        return json.dumps({"chosen": self._chosen, "shares": self._shares})
 
-    def restore_layouts(self, layouts: Mapping[Page, str]) -> None:
-        """Restore the layouts of an earlier run; those that do not fit are ignored."""
-        for page, text in layouts.items():
-            state = QByteArray.fromBase64(text.encode())
-            versions = (_SHARED, _OWN) if page in _DOCKS_OF_PAGE else ()
-            if any(self.restoreState(state, version) for version in versions):
-                self._layouts[page] = state
-        page, self._page = self._page, "start"
-        self.show_page(page)
+    def restore_layout(self, text: str) -> None:
+        """Restore the layout of an earlier run; one that does not fit is ignored."""
+        with suppress(ValueError, TypeError, KeyError, AttributeError):
+            stored = json.loads(text)
+            left, right = (min(max(float(one), 0.1), 0.45) for one in stored["shares"])
+            chosen = {name: bool(stored["chosen"][name]) for name in stored["chosen"]}
+            self._shares = [left, right]
+            self._chosen = {name: chosen[name] for name in chosen if name in self._parts}
+        self._arrange()
 
     def add_action(self, menu: str, text: str, keys: str, do: Callable[[], object]) -> QAction:
         """Add an action to one of the `menus`."""
@@ -249,10 +222,7 @@ class MainWindow(QMainWindow):
         if keys:
             action.setShortcut(QKeySequence(keys))
         action.triggered.connect(lambda _checked=False: do())
-        if menu == "View":
-            self.menus[menu].insertAction(self._dock_actions_start, action)
-        else:
-            self.menus[menu].addAction(action)
+        self.menus[menu].addAction(action)
         return action
 
     def say_why_not(self, action: QAction, why: Callable[[], str]) -> None:
@@ -282,31 +252,15 @@ class MainWindow(QMainWindow):
             super().keyPressEvent(event)
 
     def event(self, event: QEvent) -> bool:
-        """Pass key events to the bar, which detects keys that are held down; note a dragging."""
+        """Pass key events to the bar, which detects keys that are held down."""
         if isinstance(event, QKeyEvent):
             self._bar.notice_key(event)
-        if isinstance(event, QMouseEvent) and event.type() == QEvent.Type.MouseButtonPress:
-            self._is_own |= self.isSeparator(event.position().toPoint())
-        elif event.type() == QEvent.Type.MouseButtonRelease and self._is_own:
-            self._least_px = self._stack.width()
         return super().event(event)
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Handle the keys that a floating dock ignores, and fit the tabs of a resized one."""
-        if isinstance(watched, QDockWidget) and event.type() == QEvent.Type.Resize:
-            self._titles_timer.start()
-        is_apart = isinstance(watched, QDockWidget) and watched.window() is not self
-        if is_apart and isinstance(event, QKeyEvent):
-            self._bar.notice_key(event)
-            if event.type() == QEvent.Type.KeyPress:
-                self.keyPressEvent(event)
-                return event.isAccepted()
-        return super().eventFilter(watched, event)
-
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Share the new room, once the window is no longer being resized."""
+        """Keep the shares of the columns."""
         super().resizeEvent(event)
-        self._share_soon.start()
+        self._share_width()
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Emit `closing` before the window closes, if it may."""
@@ -314,70 +268,62 @@ class MainWindow(QMainWindow):
             event.ignore()
             return
         self.closing.emit()
+        for section in self.sections.values():
+            section.hide()  # those that are windows of their own
         super().closeEvent(event)
 
-    def _keep_layout(self) -> None:
-        if self._docks_of_page:
-            self._layouts[self._page] = self.saveState(_OWN if self._is_own else _SHARED)
+    def _offered(self) -> frozenset[str]:
+        """Return the panels of the page in its arrangement."""
+        if self._page == "review":
+            return _REVIEW
+        is_shown = self._page == "live" and self._arrangement == "panels"
+        return frozenset(TITLES) if is_shown else frozenset()
 
-    def _restore_layout(self, page: Page, *, is_small: bool) -> None:
-        """Restore a page's layout, or the default where it needs a larger screen."""
-        size_px = self.size()
-        room_px = self.screen().availableSize() - (self.frameGeometry().size() - size_px)
-        default = self._default_layouts[is_small]
-        hide_tabs(self)
-        layout = self._layouts.get(page, default)
-        self._is_own = self.restoreState(layout, _OWN)
-        self.restoreState(layout, _SHARED)  # or nothing, where it is the user's
-        is_unfit = self.minimumSizeHint().boundedTo(room_px) != self.minimumSizeHint()
-        is_unfit |= is_small and has_columns(self, self._docks) and self._missing_px() > 0
-        if is_unfit:
-            if self._docks_of_page:  # or it is kept, for the arrangement with panels
-                self._layouts.pop(page, None)
-            self.restoreState(default, _SHARED)
-            self._is_own = False
-            self._find_least_size()
-            self.resize(size_px)  # Qt has enlarged it
+    def _choose(self, name: str, is_open: bool) -> None:
+        self._chosen[name] = is_open
+        self._arrange()
 
-    def _missing_px(self) -> float:
-        """Return the width that the guide lacks."""
-        least_px = min(_GUIDE * font_px(), self._least_px)
-        return least_px - self._stack.width() if self._page == "live" else 0.0
+    def _arrange(self) -> None:
+        """Show the panels of the page, open or folded."""
+        offered = self._offered()
+        self._guide.use_whole_window(self._page == "live" and not offered)
+        for name, section in self.sections.items():
+            section.setVisible(name in offered)
+            is_open = self._page == "review" or name in self._opened
+            section.set_open(section.isWindow() or self._chosen.get(name, is_open))
+        self.tabs.offer(offered & {*TABS})
+        self.tabs.setVisible(bool(offered))
+        self.tabs.set_open(self._chosen.get("tabs", self._page == "review"))
+        for name, go_to in self._go_to.items():
+            go_to.setEnabled(name in offered)
+            for action in self._far_reaching[name]:
+                action.setVisible(name in offered)
+        share_height(self._columns[0], [self.sections[name] for name in LEFT])
+        share_height(self._columns[1], [*(self.sections[name] for name in RIGHT), self.tabs])
+        for side in self._sides:
+            side.setVisible(bool(offered))
+        self._share_width()
 
-    def _own_layout(self) -> None:
-        self._is_own = True
+    def _share_width(self) -> None:
+        """Give a column its share of the width, or hardly any while all of it is folded."""
+        widths = []
+        for side, made, share, names in zip(
+            self._sides, self._columns, self._shares, (LEFT, (*RIGHT, "tabs")), strict=True
+        ):
+            bar_px = side.verticalScrollBar().sizeHint().width()
+            side.setMinimumWidth(made.minimumSizeHint().width() + bar_px)
+            widths.append(round(self.width() * share) if self._is_open(names) else 0)
+        self._splitter.setSizes([widths[0], self.width() - sum(widths), widths[1]])
 
-    def _fit_panels(self) -> None:
-        """Share the window's new room, with the layout of its size unless the user has made one."""
-        if self._docks_of_page and not self._is_own and self._is_small() != self._was_small:
-            focus = QApplication.focusWidget()
-            closed = [one for one in self._docks.values() if not one.toggleViewAction().isChecked()]
-            self.reset_layout()
-            for dock in closed:
-                dock.close()
-            for dock in self._docks.values():
-                if focus is not None and dock.isAncestorOf(focus):
-                    dock.raise_()
-                    focus.setFocus()
-        self._share_room()
+    def _is_open(self, names: tuple[str, ...]) -> bool:
+        parts = [self._parts[name] for name in names]
+        return any(part.is_open and not (part.isHidden() or part.isWindow()) for part in parts)
 
-    def _share_room(self) -> None:
-        """Divide the window as by default, or leave it, with a guide as wide as it needs to be."""
-        if self._docks_of_page and not self._is_own:
-            least_px = self._pages["review"].minimumSizeHint().width() + 5 * SPACING_PX
-            review_px = max(least_px, self.width() * _REVIEW_PERCENT // 100)
-            share_room(self, self._docks, review_px if self._page == "review" else None)
-        elif (missing_px := self._missing_px()) > 0:
-            widen_page(self, self._docks, missing_px)
-
-    def _find_least_size(self) -> None:
-        """Compute the least size for the docks shown, at once."""
-        if (box := self.layout()) is not None:
-            box.activate()  # or it stays that of the page before
-
-    def _is_small(self) -> bool:
-        width, height = _SMALL
-        return self.width() < width * font_px() or self.height() < height * font_px()
+    def _keep_shares(self) -> None:
+        sizes = self._splitter.sizes()
+        for i, names in enumerate((LEFT, (*RIGHT, "tabs"))):
+            if self._is_open(names):
+                self._shares[i] = sizes[2 * i] / max(self.width(), 1)
 
     def _make_menus(self) -> None:
         self.menus = {name: self.menuBar().addMenu(title) for name, title in _MENUS.items()}
@@ -387,15 +333,18 @@ class MainWindow(QMainWindow):
             name: menu.addAction(title, QKeySequence(f"Ctrl+{number}"), partial(self.go_to, name))
             for number, (name, title) in enumerate(TITLES.items(), 1)
         }
-        self._station = view.addAction(
-            tr("&Station: only the guide"), QKeySequence("F11"), self._swap
-        )
+        self._station = view.addAction(tr("&Station view"), QKeySequence("F11"), self._swap)
         self._station.setCheckable(True)
-        self._dock_actions_start = view.addSeparator()
-        for dock in self._docks.values():
-            view.addAction(dock.toggleViewAction())
+        self._station.setToolTip(tr("Only the guide: one picture, one sentence, one button (F11)"))
 
     def _swap(self) -> None:
         arrangement: Arrangement = "panels" if self._arrangement == "station" else "station"
         self.use_arrangement(arrangement)
         self.arrangement_changed.emit(arrangement)
+
+
+def _side(made: QWidget) -> QScrollArea:
+    """Return a column that scrolls when more is open than it has room for."""
+    area = scrollable(made)
+    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    return area

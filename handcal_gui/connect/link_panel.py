@@ -18,8 +18,8 @@ from handcal_gui.connect.key_field import KeyField
 from handcal_gui.widgets.fields import button, label_for, with_name
 from handcal_gui.widgets.layouts import hbox, scrollable, vbox
 from handcal_gui.widgets.number_label import UNKNOWN
-from handcal_gui.widgets.number_table import NumberTable, Row
 from handcal_gui.widgets.sentence import sentence
+from handcal_gui.widgets.table import Row, Table
 
 _PERIOD_S = 0.25
 """Interval of updating the numbers; faster changes cannot be read."""
@@ -82,7 +82,7 @@ class LinkPanel(QWidget):
         form.setContentsMargins(0, 0, 0, 0)
         form.addRow(tr("Address"), hbox((self._address, 1), self.new_key))
         form.addRow(label_for(self._key, tr("Key")), self._key)
-        self._table = NumberTable("link-table", tr("Numbers of the link"))
+        self._table = Table("link-table", tr("Numbers of the link"))
         self._of_session = self._pairing, self.connect_headset, self.restart_headset
         for part in self._of_session:
             part.hide()

@@ -13,7 +13,8 @@ from contextlib import ExitStack, contextmanager, suppress
 from PySide6.QtCore import QObject, Signal
 
 from handcal.bridge.bridges import BridgeSettings, open_bridges
-from handcal.core.errors import HandcalError
+from handcal.calibration.procedure import Calibration
+from handcal.core.errors import FileError, HandcalError
 from handcal.session.unfinished import summarize
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
@@ -23,7 +24,24 @@ from handcal_gui.engine.worker import Worker
 _LOG = logging.getLogger(__name__)
 
 Command = Callable[[Station], object]
+Submit = Callable[[str, Command], int]
+"""Gives the engine a command by a name that completes "could not …"; returns its number."""
 _NO_BRIDGES = BridgeSettings()
+
+
+def no_engine(_name: str, _command: Command) -> int:
+    """Take a command while no engine runs, and drop it."""
+    return 0
+
+
+def calibrating(command: Callable[[Calibration], object]) -> Command:
+    """Return a command to the procedure, which keeps data that it cannot write yet."""
+
+    def command_station(station: Station) -> None:
+        with suppress(FileError):
+            command(station.calibration)
+
+    return command_station
 
 
 class EngineThread(Worker):

@@ -18,7 +18,8 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.core.types import UInt8
-from handcal.report.document import Figure, Report, Table
+from handcal.report.document import Figure, Report
+from handcal.report.document import Table as ReportTable
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
 from handcal_gui.evaluate.work import Outcome
@@ -33,9 +34,9 @@ from handcal_gui.widgets.fields import (
 )
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.layouts import hbox, scrollable, vbox
-from handcal_gui.widgets.number_table import NumberTable, Row
 from handcal_gui.widgets.opening import open_path
 from handcal_gui.widgets.sentence import sentence
+from handcal_gui.widgets.table import Column, Row, Table
 
 
 class ResultsView(QWidget):
@@ -169,16 +170,16 @@ class _Sheet(ImageView):
             self.clicked.emit()
 
 
-def _key_tables(report: Report) -> list[Table]:
+def _key_tables(report: Report) -> list[ReportTable]:
     """Return the tables with a header, from the first section that has any."""
     for section in report.sections:
-        tables = [item for item in section.items if isinstance(item, Table)]
+        tables = [item for item in section.items if isinstance(item, ReportTable)]
         if shown := [table for table in tables if any(one.title for one in table.columns)]:
             return shown
     return []
 
 
-def _titles(tables: list[Table]) -> list[str]:
+def _titles(tables: list[ReportTable]) -> list[str]:
     """Return the beginnings of the tables' captions; numbers if these do not tell them apart."""
     if len(tables) == 1:
         return [tr("Numbers")]
@@ -188,18 +189,20 @@ def _titles(tables: list[Table]) -> list[str]:
     return [tr("Numbers {}").format(number) for number in range(1, len(tables) + 1)]
 
 
-def _table_page(table: Table) -> QWidget:
-    view = NumberTable("numbers", tr("Numbers"), hides=True)
-    titles = [column.title for column in table.columns[1:]]
+def _table_page(table: ReportTable) -> QWidget:
+    view = Table("numbers", tr("Numbers"))
+    columns = [
+        Column(one.title.replace(", ", "\n"), rank=i) for i, one in enumerate(table.columns[1:])
+    ]
     caption = paragraph("caption", table.caption)
 
-    def name_hidden(titles: str) -> None:
-        there_is_more = tr("There is no room for: {}. View large, or open the report.")
-        more = there_is_more.format(titles) if titles else ""
-        caption.setText(f"{table.caption} {more}".strip())
+    def name_hidden() -> None:
+        more = tr("There is no room for: {}. View large, or open the report.")
+        hidden = more.format("; ".join(view.hidden).replace("\n", ", ")) if view.hidden else ""
+        caption.setText(f"{table.caption} {hidden}".strip())
 
     view.hidden_changed.connect(name_hidden)
-    view.show_rows(titles, [Row(cells[0], tuple(cells[1:])) for cells in table.rows])
+    view.show_rows(columns, [Row(cells[0], tuple(cells[1:])) for cells in table.rows])
     return _page(view, caption)
 
 

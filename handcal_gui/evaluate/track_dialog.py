@@ -35,7 +35,7 @@ from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, vbox
-from handcal_gui.widgets.number_table import NumberTable, Row
+from handcal_gui.widgets.table import Row, Table
 
 _POLL_MS = 30
 _AXES = ("x", "y", "z")
@@ -95,7 +95,7 @@ class TrackDialog(PreparationDialog):
         self._view.show_text(
             message=tr("The camera's image and the cube's edges will be shown here.")
         )
-        self._pose = NumberTable("pose-of-the-cube", tr("Pose of the cube"))
+        self._pose = Table("pose-of-the-cube", tr("Pose of the cube"))
         self._pose.setMinimumWidth(44 * SPACING_PX)
         self._pose.hide()
         self._task = one_of(

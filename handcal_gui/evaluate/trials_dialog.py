@@ -32,10 +32,10 @@ from handcal_gui.widgets.fields import button, choice, main_button, paragraph, w
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, vbox
-from handcal_gui.widgets.number_table import NumberTable, Row
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.path_field import PathField
 from handcal_gui.widgets.result_rows import EYE_NAMES
+from handcal_gui.widgets.table import Row, Table
 
 STEP_M = 0.00025
 _POLL_S = 0.1
@@ -170,7 +170,7 @@ class TrialsDialog(PreparationDialog):
         self._next.setMinimumWidth(self._next.sizeHint().width())
         self._starting, self._going = action_strip(self._start), action_strip(self._next)
         self._close = button("close", tr("&Close"))
-        self._table = NumberTable("trials-recorded", tr("Trials recorded"))
+        self._table = Table("trials-recorded", tr("Trials recorded"))
         self._table.hide()
         self._moves = {
             name: button(

@@ -39,9 +39,9 @@ from handcal_gui.widgets.fields import button, main_button, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import vbox
-from handcal_gui.widgets.number_table import NumberTable, Row
 from handcal_gui.widgets.opening import open_path
 from handcal_gui.widgets.result_rows import EYE_NAMES
+from handcal_gui.widgets.table import Row, Table
 
 _HOW = tr(
     "For each eye, put the viewpoint camera behind its display. In a dark room, take "
@@ -77,7 +77,7 @@ class AcceptDialog(QDialog):
         self._found = FindingLine("accepted")
         self._drawing = Drawing("docs/pictures/setup-accept.svg")
         self._drawing.setMinimumHeight(10 * SPACING_PX)
-        self._table = NumberTable("drawn-against-seen", tr("Drawn and seen corners"))
+        self._table = Table("drawn-against-seen", tr("Drawn and seen corners"))
         self._bar = JobBar()
         self._run = main_button("runAcceptance", tr("Check the rig"))
         self._open = button("openPage", tr("Open re&port"))

@@ -47,9 +47,9 @@ from handcal_gui.widgets.fields import (
 )
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import vbox
-from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.path_field import PathField
 from handcal_gui.widgets.sentence import sentence
+from handcal_gui.widgets.table import Table
 from handcal_gui.widgets.times import local_time
 
 _RIG_FILES = tr("Rig files (*.yaml *.yml)")
@@ -98,9 +98,9 @@ class ResultPage(QWidget):
         self._findings = _findings_table()
         self._how = make_linked(paragraph("howToCheck", _HOW.format(_CHECKS)))
         self._how.linkActivated.connect(read)
-        self._numbers = NumberTable("numbers-of-the-rig", tr("Numbers of the rig"))
+        self._numbers = Table("numbers-of-the-rig", tr("Numbers of the rig"))
         self._other = PathField(tr("Rig file to compare with"), "file", _RIG_FILES)
-        self._differences = NumberTable("differences", tr("Differences"))
+        self._differences = Table("differences", tr("Differences"))
         self._compared = FindingLine("compared")
         self._end = FindingLine("savedRig")
         self.main = main_button("saveRig", tr("&Save rig file…"))

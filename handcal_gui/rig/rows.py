@@ -16,8 +16,8 @@ from handcal.rig.lens.stereo import StereoCalibration
 from handcal_gui.app.translation import tr
 from handcal_gui.rig.lens_fields import LENSES
 from handcal_gui.widgets.number_label import UNKNOWN
-from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.sentence import sentence
+from handcal_gui.widgets.table import Row
 
 COLUMNS = (tr("Value"), "± σ")
 LENS_COLUMNS = (tr("Images left out, px"), tr("Edge, px"))

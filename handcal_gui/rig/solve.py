@@ -34,7 +34,7 @@ from handcal_gui.rig.project_folder import (
 )
 from handcal_gui.rig.rows import camera_rows, display_rows, lens_rows, stereo_rows
 from handcal_gui.rig.shots import Shot, excluding
-from handcal_gui.widgets.number_table import Row
+from handcal_gui.widgets.table import Row
 
 CAMERA_MISSING = tr("the viewpoint camera's intrinsics are missing: solve its step first")
 

@@ -20,8 +20,8 @@ from handcal_gui.widgets.fields import main_button, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, vbox
-from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.sentence import sentence
+from handcal_gui.widgets.table import Table
 from handcal_gui.widgets.times import local_time
 
 HEALTHS = {"good": Health.GOOD, "needs more views": Health.LIMITED, "bad": Health.BROKEN}
@@ -39,7 +39,7 @@ class SolveBox(QWidget):
     bar : JobBar
     numbers : QWidget
         The tables of the numbers and of the lens models compared, placed by the page.
-    table : NumberTable
+    table : Table
     shown : Signal()
         Another result is shown, or none.
     """
@@ -55,8 +55,8 @@ class SolveBox(QWidget):
         self._verdict = FindingLine("verdict")
         self._worst = paragraph("worst")
         self._worst.setIndent(3 * SPACING_PX)  # below the verdict's text
-        self._lenses = NumberTable("lenses", tr("Lens models compared"))
-        self.table = NumberTable("numbers", tr("Numbers"))
+        self._lenses = Table("lenses", tr("Lens models compared"))
+        self.table = Table("numbers", tr("Numbers"))
         self.numbers = QWidget()
         hbox((self.table, 2), (self._lenses, 3), on=self.numbers, spacing=SPACING_PX)
         self._shown = _NOT_YET

@@ -217,7 +217,7 @@ class StepPage(QWidget):
         for place, (title, panel) in enumerate(panels, _FIRST_PANEL):
             count = f" ({panel.count})" if panel.count else ""
             self._tabs.setTabText(place, f"{title}{count}")
-        self._tabs.setTabEnabled(self._tabs.count() - 1, self.box.table.rowCount() > 0)
+        self._tabs.setTabEnabled(self._tabs.count() - 1, bool(self.box.table.keys))
         problems = (field.problem for field in self.form.findChildren(PathField))
         need = "" if self._is_looking else next(filter(None, problems), self.need)
         self.box.allow(need, is_busy=self._is_looking or self.box.bar.is_busy)

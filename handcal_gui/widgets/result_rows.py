@@ -9,23 +9,27 @@ from dataclasses import dataclass
 import numpy as np
 
 from handcal.core.types import EYES, Eye, EyeShift, VerdictName
+from handcal.register import verdict_words
 from handcal.register.results import Results
 from handcal.report.cells import signed
 from handcal.session.judged_trials import EyeTrials, is_doubted
 from handcal.session.record import SessionRecord
 from handcal.session.trial import SAME_SHIFT_M, Trial
 from handcal_gui.app.translation import tr
-from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.sentence import sentence
+from handcal_gui.widgets.table import Row
 
 EYE_NAMES: Mapping[Eye, str] = {"left": tr("Left eye"), "right": tr("Right eye")}
+_SYMBOLS: Mapping[VerdictName, str] = {
+    "accept": "✓",
+    "repeat": "↻",
+    "keep": "↩",
+    "implausible": "✕",
+    "contradicted": "✕",
+}
 VERDICT_WORDS: Mapping[VerdictName, str] = {
-    "accept": tr("✓ Accept"),
-    "repeat": tr("↻ Repeat"),
-    "keep": tr("↩ Keep offline"),
-    "implausible": tr("✕ Implausible"),
-    "contradicted": tr("✕ Contradicted"),
+    name: f"{_SYMBOLS[name]} {word}" for name, word in verdict_words.VERDICT_WORDS.items()
 }
 VERDICT_COLORS: Mapping[VerdictName, str] = {
     "accept": "good",
@@ -207,10 +211,8 @@ def eyes_text(eyes: Sequence[Eye]) -> str:
 
 
 def verdict_word(results: Results, eye: Eye, trials: EyeTrials | None = None) -> str:
-    """Return an eye's verdict in a word: what a result to be repeated needs may be to verify."""
-    name, advice = results.verdicts[eye].name, results.advice.get(eye)
-    if name == "repeat" and advice is not None and advice.verify and not advice.alignments:
-        return tr("↻ Verify")
+    """Return an eye's verdict in a word, or the doubt that trials cast on it."""
+    name = results.verdicts[eye].name
     if trials is not None and is_doubted(name, trials):
         return doubt_word(trials.target_arcmin)
     return VERDICT_WORDS[name]
@@ -231,7 +233,7 @@ def verdict_reason(results: Results, eye: Eye, trials: EyeTrials | None = None) 
     verdict = results.verdicts[eye]
     if trials is None or not is_doubted(verdict.name, trials):
         return sentence(verdict.reason)
-    advice = tr("Trials found {:.1f}′: if φ was set carefully in them, measure again")
+    advice = tr("Trials found {:.1f}′. If φ was set carefully in them, measure again.")
     return advice.format(trials.mean_arcmin)
 
 

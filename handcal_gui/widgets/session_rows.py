@@ -15,10 +15,9 @@ from handcal.session.session import SessionRecord
 from handcal.session.state import Kind, SessionEvent
 from handcal.session.trial import Trial, TrialSpread, trial_spread
 from handcal_gui.app.translation import tr
-from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.numbers import pluralize
-from handcal_gui.widgets.record_table import RecordColumn
 from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, eyes_text
+from handcal_gui.widgets.table import Column, Row
 from handcal_gui.widgets.times import local_time
 
 _PHI = tr(
@@ -28,48 +27,48 @@ _PHI = tr(
 RESUME_HELP = tr("Open camera and headset to add alignments, fine-tuning or trials")
 """Of any session that can be read, finished or not."""
 ALIGNMENT_COLUMNS = (
-    RecordColumn(tr("No."), tr("Number of the alignment")),
-    RecordColumn(tr("Eyes"), tr("Eyes open during the alignment"), is_number=False),
-    RecordColumn(
+    Column(tr("No."), tr("Number of the alignment")),
+    Column(tr("Eyes"), tr("Eyes open during the alignment"), is_number=False),
+    Column(
         tr("Rotation °"),
         tr("Angle between hand and cursor at the confirmation, in degrees"),
         rank=2,
     ),
-    RecordColumn(tr("φ1 mm"), _PHI, rank=1),
-    RecordColumn(tr("φ2 mm"), _PHI, rank=1),
-    RecordColumn(tr("φ3 mm"), _PHI, rank=1),
-    RecordColumn(
+    Column(tr("φ1 mm"), _PHI, rank=1),
+    Column(tr("φ2 mm"), _PHI, rank=1),
+    Column(tr("φ3 mm"), _PHI, rank=1),
+    Column(
         tr("Point RMS mm"),
         tr("Distance from the hand's points to their partners on the cursor, in millimetres"),
         rank=3,
     ),
-    RecordColumn(
+    Column(
         tr("Inliers %"),
         tr("Percentage of the hand's points with a partner on the cursor"),
         rank=4,
     ),
-    RecordColumn(tr("Time"), tr("Time of the confirmation"), rank=5),
+    Column(tr("Time"), tr("Time of the confirmation"), rank=5),
 )
 TRIAL_COLUMNS = (
-    RecordColumn(tr("No."), tr("Number of the trial")),
-    RecordColumn(tr("Eye"), tr("Eye that looked at the target"), is_number=False),
-    RecordColumn(tr("Distance m"), tr("Distance of the target, in metres"), rank=1),
-    RecordColumn(
+    Column(tr("No."), tr("Number of the trial")),
+    Column(tr("Eye"), tr("Eye that looked at the target"), is_number=False),
+    Column(tr("Distance m"), tr("Distance of the target, in metres"), rank=1),
+    Column(
         tr("Error px"),
         tr("Mean over the target's four corners, in pixels of the display"),
         rank=2,
     ),
-    RecordColumn(tr("Error ′"), tr("Mean over the target's four corners, in arcminutes")),
-    RecordColumn(tr("Time"), tr("Time of the recording"), rank=3),
+    Column(tr("Error ′"), tr("Mean over the target's four corners, in arcminutes")),
+    Column(tr("Time"), tr("Time of the recording"), rank=3),
 )
 STATISTICS_COLUMNS = (
-    tr("Trials"),
-    tr("Mean ′"),
-    tr("SD of trials ′"),
-    tr("Calibrations"),
-    tr("SD of calibrations ′"),
-    tr("Median ′"),
-    tr("Max ′"),
+    Column(tr("Trials")),
+    Column(tr("Mean ′")),
+    Column(tr("SD of trials ′")),
+    Column(tr("Calibrations"), rank=2),
+    Column(tr("SD of calibrations ′"), rank=1),
+    Column(tr("Median ′"), rank=3),
+    Column(tr("Max ′"), rank=4),
 )
 _SPREAD_HELP = tr(
     "Each trial counts once, with the mean of its corners, in arcminutes. Trials of one\n"
@@ -107,8 +106,8 @@ def deletions(record: SessionRecord) -> list[Deletion]:
     return found
 
 
-def alignment_rows(record: SessionRecord, results: Results | None) -> dict[int, tuple[str, ...]]:
-    """Return cells for `ALIGNMENT_COLUMNS`, by the alignment's number; a line for each open eye.
+def alignment_rows(record: SessionRecord, results: Results | None) -> list[Row]:
+    """Return rows for `ALIGNMENT_COLUMNS`, by the alignment's number; a line for each open eye.
 
     Parameters
     ----------
@@ -121,7 +120,7 @@ def alignment_rows(record: SessionRecord, results: Results | None) -> dict[int, 
         solved = {}
     saved = SessionEvent.ALIGNMENT_SAVED
     times = {event.data["number"]: event.time for event in record.events if event.name == saved}
-    rows: dict[int, tuple[str, ...]] = {}
+    rows = []
     for number, alignment in record.alignments.items():
         shifts = solved.get(number, {})
         angle_deg = np.degrees(np.linalg.norm(alignment.rotation_rad))
@@ -130,13 +129,14 @@ def alignment_rows(record: SessionRecord, results: Results | None) -> dict[int, 
         rms = (f"{1e3 * shift.rms_m:.2f}" for shift in alone)
         inliers = (f"{100 * shift.inlier_ratio:.0f}" for shift in alone)
         measured = ("\n".join(lines) for lines in (*phi, rms, inliers))
-        rows[number] = (
+        cells = (
             str(number),
             eyes_text(alignment.eyes),
             f"{angle_deg:.1f}",
             *(text or NOTHING for text in measured),
             local_time(times[number], _CLOCK),
         )
+        rows.append(Row("", cells, key=number))
     return rows
 
 
@@ -145,19 +145,23 @@ def trials_id(record: SessionRecord) -> tuple[Path, tuple[int, ...]]:
     return record.path, tuple(record.trials)
 
 
-def trial_rows(record: SessionRecord) -> dict[int, tuple[str, ...]]:
-    """Return cells for `TRIAL_COLUMNS`, by the trial's number."""
-    return {
-        number: (
-            str(number),
-            EYE_NAMES[trial.eye],
-            f"{trial.target_depth_m:g}",
-            f"{trial.error_px.mean():.1f}",
-            f"{trial.error_arcmin.mean():.1f}",
-            local_time(trial.time, _CLOCK),
+def trial_rows(record: SessionRecord) -> list[Row]:
+    """Return rows for `TRIAL_COLUMNS`, by the trial's number."""
+    return [
+        Row(
+            "",
+            (
+                str(number),
+                EYE_NAMES[trial.eye],
+                f"{trial.target_depth_m:g}",
+                f"{trial.error_px.mean():.1f}",
+                f"{trial.error_arcmin.mean():.1f}",
+                local_time(trial.time, _CLOCK),
+            ),
+            key=number,
         )
         for number, trial in record.trials.items()
-    }
+    ]
 
 
 def statistics_rows(trials: Mapping[int, Trial]) -> list[Row]:

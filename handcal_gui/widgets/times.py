@@ -8,8 +8,8 @@ _FOLDER = "session-%Y%m%d-%H%M%S-%f"
 """The name that `Session.create` gives a folder, with the time in UTC."""
 
 
-def local_time(utc: str, form: str = "%d %b %Y, %H:%M") -> str:
-    """Return an ISO 8601 time as local time; other texts unchanged."""
+def local_time(utc: str, form: str = "%Y-%m-%d %H:%M") -> str:
+    """Return an ISO 8601 time as local time, the same in every language; other texts unchanged."""
     try:
         return f"{datetime.fromisoformat(utc).astimezone():{form}}"
     except (ValueError, OverflowError):  # overflow: year 1 in another time zone

@@ -10,6 +10,7 @@ import pytest
 from handcal.calibration.evidence import FROZEN_FRAMES, Contradiction, Evidence
 from handcal.core.types import CameraIdentity, DepthCheck, Frame
 from handcal.rig.example import example_rig
+from handcal.session.facts import CameraUsed
 
 RIG = example_rig()
 IDENTITY = CameraIdentity("Intel RealSense D415", "1234")
@@ -114,3 +115,14 @@ def test_a_late_camera_forbids_frames_while_it_is_known_to_be_late() -> None:
     assert found.name == "late-camera"
     assert "160 ms" in found.text
     assert evidence.contradictions == ()
+
+
+@pytest.mark.parametrize("others", [{"serial_number": "77"}, {"model": "Recording of a room"}])
+def test_a_resumed_session_uses_no_frame_of_another_camera(others: dict[str, str]) -> None:
+    used = CameraUsed(IDENTITY, frame(0).depth_intrinsics, 0.001)
+    evidence = Evidence(RIG, used=used)
+    found = evidence.see(frame(0), replace(IDENTITY, **others))
+    assert found is not None
+    assert found.name == "session-camera"
+    assert evidence.see(frame(1), IDENTITY) is None
+    assert evidence.contradictions == ()  # the result is still that of its own camera

@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from handcal.calibration.former import SLIP_M, read_former
+from handcal.calibration.former import (
+    LONGEST_WORN,
+    SLIP_M,
+    end_former,
+    may_still_be_worn,
+    read_former,
+)
 from handcal.calibration.procedure import Calibration
 from handcal.calibration.states import ProcedureError, State
 from handcal.core.errors import FileError
 from handcal.core.types import EYES, Eye, Float64, Verdict
 from handcal.session.session import Session
+from handcal.session.unfinished import unfinished_and_repaired
 from tests.calibration.stage import RIG, SETTINGS, Stage, events
 from tests.helpers import eventually
 
@@ -139,3 +147,18 @@ def test_going_back_loses_no_alignment_and_no_result(stage: Stage, session: Sess
     session.finish()
     calibration.go_back("former")
     assert Session.open(session.path).is_finished
+
+
+def test_a_headset_may_have_moved_hours_after_the_last_event(session: Session) -> None:
+    record = session.contents
+    last = datetime.fromisoformat(record.events[-1].time)
+    assert may_still_be_worn(record, last + LONGEST_WORN)
+    assert not may_still_be_worn(record, last + LONGEST_WORN + timedelta(seconds=1))
+
+
+def test_a_session_from_which_another_began_is_over(stage: Stage, session: Session) -> None:
+    stage.calibrate()
+    session.close()
+    end_former(session.path)
+    assert Session.open(session.path).is_finished
+    assert not unfinished_and_repaired(session.path.parent)[0]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from handcal.calibration.hands import RecentHands
-from handcal.core.errors import HandError, PoseError, PosePendingError
+from handcal.core.errors import HandError, NoFrameError, PoseError, PosePendingError
 from handcal.core.geometry import rigid
 from handcal.core.types import Float64, HandCloud
 
@@ -102,7 +102,7 @@ def test_a_hand_is_steady_if_it_hardly_moved_for_a_while(
 def test_the_hand_nearest_in_time_is_returned_while_it_is_kept(hands: RecentHands) -> None:
     placed = [hands.add(cloud(), number * PERIOD_NS)[0] for number in range(1, 4)]
     assert hands.nearest(2 * PERIOD_NS + 40_000_000, 0.15) is placed[1]
-    with pytest.raises(HandError, match="did not see your hand"):
+    with pytest.raises(HandError):
         hands.nearest(4 * PERIOD_NS, 0.05)
     hands.add(None, 16 * PERIOD_NS)  # the first two are older than 1.4 s now
     with pytest.raises(HandError):
@@ -123,3 +123,14 @@ def test_a_hold_is_what_came_before_the_hand_and_holds_it_even_out_of_order(
     # A later frame whose estimated time is earlier, of a hand elsewhere.
     hands.add(cloud(0.2), 13 * PERIOD_NS - 1)
     assert hands.held_at(hand) == [hand]
+
+
+def test_a_moment_without_a_frame_is_no_moment_without_a_hand(hands: RecentHands) -> None:
+    for i in range(3):
+        hands.add(cloud(), i * 10 * PERIOD_NS)
+    assert hands.nearest(10 * PERIOD_NS, 0.15).t_host_ns == 10 * PERIOD_NS
+    with pytest.raises(NoFrameError):
+        hands.nearest(15 * PERIOD_NS, 0.15)
+    hands.add(None, 15 * PERIOD_NS, missed_for=HandError("no hand"))
+    with pytest.raises(HandError, match="did not see your hand"):
+        hands.nearest(15 * PERIOD_NS, 0.15)

@@ -23,6 +23,7 @@ from handcal.lab.demo import DemoSettings, measure_eye_distance
 from handcal.register.benefit import DISTANCES_M
 from handcal.register.prior import eye_position_m
 from handcal.register.results import USED
+from handcal.register.verdict_words import VERDICT_WORDS
 from handcal.rig.example import Z_E_S_M, example_rig
 from handcal.session.session import Session
 from handcal.sim.wearer import draw_eyes
@@ -268,12 +269,12 @@ def test_each_verdict_says_whether_it_is_drawn_and_what_to_try(
     verdict: VerdictName, settings: DemoSettings
 ) -> None:
     (said,) = meanings({"left": verdict, "right": verdict}, settings, "results/one")
-    assert said.startswith(f"Both eyes, {verdict}: ")
+    assert said.startswith(f"Both eyes, {VERDICT_WORDS[verdict]}: ")
     assert ("headset draws with this result" in said) == (verdict in USED)
     _, command = said.rsplit(": handcal ", 1)
     tried = parse(command.split())
     if verdict == "accept":
-        assert str(tried.session) == "results/one"
+        assert [str(one) for one in tried.session] == ["results/one"]
     elif verdict == "repeat":
         assert (tried.plan, tried.eye_distance) != (settings.plan, settings.eye_distance) or (
             tried.seed != settings.seed
@@ -284,8 +285,8 @@ def test_each_verdict_says_whether_it_is_drawn_and_what_to_try(
 def test_eyes_with_different_verdicts_are_told_apart() -> None:
     said = meanings({"left": "keep", "right": "accept"}, DemoSettings(), "results/one")
     assert [one.partition(":")[0] for one in said] == [
-        "The left eye, keep",
-        "The right eye, accept",
+        "The left eye, No better than before",
+        "The right eye, Good",
     ]
 
 

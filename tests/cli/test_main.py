@@ -230,6 +230,31 @@ def test_a_session_is_exported_in_the_formats_asked_for(
     assert "near_m < far_m is needed" in error
 
 
+def test_several_sessions_are_exported_together(
+    handcal: Callable[..., None],
+    fails: Callable[..., tuple[int, str]],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    example = resource_path("example_session")
+    paths = [shutil.copytree(example, tmp_path / "in" / name) for name in ("a", "b")]
+    output = tmp_path / "out"
+    handcal("export", *paths, "--output", output, "--format", "csv")
+    assert "1 wearer was calibrated (2 sessions, 4 eyes)" in capsys.readouterr().out
+    assert sorted(path.name for path in output.iterdir() if path.is_file()) == [
+        "parameters.csv",
+        "summary.csv",
+        "trials.csv",
+    ]
+    with Session.create(tmp_path, example_rig(), {}, name="empty") as session:
+        pass
+    code, error = fails("export", *paths, session.path, "--output", output, "--format", "csv")
+    assert code == 1
+    assert "not exported: empty: it has no alignments" in error
+    both = "--format", "northstar", "--into", tmp_path / "config.json"
+    assert fails("export", *paths, "--output", output, *both)[0] == 2
+
+
 @pytest.mark.process
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="writes to /dev/full")
 @pytest.mark.parametrize("argument", ["doctor", "--help"])

@@ -79,7 +79,7 @@ def test_a_session_is_solved() -> None:
     (left,) = re.findall("^left: φ = (.* mm); rms (.*) mm", said, re.MULTILINE)
     expected = [4.20, 1.14, -4.39, 0.96, 0.91, 2.54, 1.55]
     assert numbers(r"([+-]?[\d.]+)", " ".join(left)) == pytest.approx(expected, abs=0.05)
-    assert "right: accept: expected error" in said
+    assert "right: accept: The expected error" in said
     assert "Unity's projection, right eye:" in said
 
 

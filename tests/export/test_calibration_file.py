@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from handcal.core.conventions import opengl_projection, openxr_view, unity_camera
-from handcal.core.types import EYES, Eye, Rig
+from handcal.core.types import EYES, Rig
 from handcal.export.calibration_file import write_calibration_json, write_calibration_yaml
-from handcal.export.outcome import SessionOutcome, ShiftOrigin, load_outcome
+from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.session.session import SessionRecord
 
 
@@ -24,21 +24,21 @@ def test_filestorage_gives_every_double_back(tmp_path: Path, outcome: SessionOut
     assert storage.getNode("handcal_calibration").real() == 1
     assert storage.getNode("wearer").string() == outcome.record.wearer
     assert outcome.results is not None
-    finals: dict[Eye, ShiftOrigin] = {"left": "fine_tuned", "right": "solved"}
-    for eye, final in finals.items():
+    assert [drawn.kind for drawn in outcome.drawn.values()] == ["set by hand", "solved"]
+    for eye, drawn in outcome.drawn.items():
         node, display = storage.getNode(eye), outcome.record.rig.eyes[eye]
         covariance_m2 = outcome.results.eyes[eye].covariance_m2
-        assert node.getNode("final").string() == final
+        assert node.getNode("final").string() == drawn.kind
         assert node.getNode("is_applied").real() == 1
-        assert np.array_equal(node.getNode("P").mat(), outcome.projection(eye, final).P)
+        assert np.array_equal(node.getNode("P").mat(), outcome.projection(eye).P)
         assert np.array_equal(node.getNode("K").mat(), display.K)
         assert np.array_equal(node.getNode("H0").mat(), display.H0)
-        assert np.array_equal(node.getNode("shift_m").mat()[:, 0], outcome.final_shift_m(eye))
+        assert np.array_equal(node.getNode("shift_m").mat()[:, 0], drawn.shift_m)
         assert np.array_equal(node.getNode("solved_covariance_m2").mat(), covariance_m2)
         assert node.getNode("width_px").real() == display.width_px
         solved_m = outcome.shifts_m[eye]["solved"]
         assert np.array_equal(node.getNode("solved_shift_m").mat()[:, 0], solved_m)
-    assert storage.getNode("right").getNode("fine_tuned_shift_m").empty()
+    assert storage.getNode("right").getNode("set_by_hand_shift_m").empty()
 
 
 def test_what_is_not_printable_is_replaced(tmp_path: Path, outcome: SessionOutcome) -> None:
@@ -66,12 +66,13 @@ def test_json_holds_every_origin_in_every_convention(
 ) -> None:
     write_calibration_json(tmp_path / "c.json", outcome, 0.2, 50.0)
     data = json.loads((tmp_path / "c.json").read_text())
+    assert data["simulated"] == outcome.record.simulated
     assert (data["near_m"], data["far_m"], data["alignments"]) == (0.2, 50.0, 2)
     assert outcome.results is not None
     assert data["solved_eye_distance_m"] == outcome.results.eye_distance_m
     for eye in EYES:
         found = data["eyes"][eye]
-        assert found["final"] == outcome.final(eye)
+        assert found["final"] == outcome.drawn[eye].kind
         assert list(found["calibrations"]) == list(outcome.shifts_m[eye])
         for origin, each in found["calibrations"].items():
             projection = outcome.projection(eye, origin)
@@ -93,7 +94,7 @@ def test_a_point_lands_on_the_same_pixel_by_opencv_and_by_opengl(
 ) -> None:
     write_calibration_json(tmp_path / "c.json", outcome, 0.1, 100.0)
     found = json.loads((tmp_path / "c.json").read_text())["eyes"]["left"]
-    each = found["calibrations"]["fine_tuned"]
+    each = found["calibrations"]["set by hand"]
     x, y, z = 0.03, -0.02, 0.5
     u, v, depth = np.array(each["opencv"]["P"]) @ [x, y, z, 1.0]
     clip_x, clip_y, _, clip_w = np.array(each["opengl"]["projection"]) @ [x, -y, -z, 1.0]

@@ -55,9 +55,9 @@ ALL_FILES = {
 }
 LIGHT: tuple[Format, ...] = ("csv", "yaml", "json", "ply", "zip")
 PREPARED = """
-from handcal.export.export import _import_drawing
+from handcal.export.export import import_drawing
 from handcal.core.progress import Progress
-_import_drawing(Progress(report=lambda what, _share: print(what)))
+import_drawing(Progress(report=lambda what, _share: print(what)))
 """
 # Exports a session, and is killed when half of it is done.
 KILLED = """

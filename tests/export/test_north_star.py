@@ -75,7 +75,7 @@ def test_each_point_is_seen_where_it_is(tmp_path: Path, outcome: SessionOutcome,
     points_H_m = rng.uniform([-0.15, -0.1, 0.4], [0.15, 0.3, 2.0], (400, 3))
     for eye, side in zip(EYES, (-0.5, 0.5), strict=True):
         display = outcome.record.rig.eyes[eye]
-        P = outcome.projection(eye, outcome.final(eye)).P @ display.T_V_H
+        P = outcome.projection(eye).P @ display.T_V_H
         u, v = ((project(P, points_H_m) + 0.5) / [display.width_px, display.height_px]).T
         shown = (u > 0.0) & (u < 1.0) & (v > 0.0) & (v < 1.0)
         assert np.count_nonzero(shown) > 50

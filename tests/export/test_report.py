@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import csv
+import json
 import re
 import shutil
 import subprocess
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -17,15 +21,20 @@ from matplotlib.transforms import Bbox
 from handcal.core.errors import CancelledError
 from handcal.core.progress import Progress
 from handcal.core.types import EYES, Eye, Float64, Verdict
+from handcal.export.calibration_file import write_calibration_json, write_calibration_yaml
+from handcal.export.definitions import DEFINITIONS
 from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.export.report import session_report
+from handcal.export.tables import table_rows, write_tables
+from handcal.export.tools import write_openxr, write_unity
 from handcal.register.benefit import expected_error_arcmin
+from handcal.register.verdict_words import VERDICT_WORDS
 from handcal.report.document import Table
 from handcal.report.pdf import compose, write_pdf
 from handcal.session.comparison import COMPARED, Answer, Comparison, Drawing, comparison_json
 from handcal.session.journal import Event
 from handcal.session.session import SessionRecord
-from handcal.session.trial import Trial
+from handcal.session.trial import Trial, make_trial
 
 COMPARED_M: dict[Eye, Float64] = {"left": np.array([1e-3, 0.0, 0.0])}
 HOSTILE = ["\n\n../../x", "$\\frac{1}{0", "x" * 10_000, "\x00\u202e🙂中"]
@@ -52,7 +61,7 @@ def test_it_says_what_was_found(pages: list[Figure], outcome: SessionOutcome) ->
             assert f"{mm(value)}\u00a0±\u00a0{1e3 * sigma:.2f}" in found
         expected = expected_error_arcmin(outcome.record.rig.eyes[eye], shift)
         assert f"{expected:.1f}" in found
-    for value in outcome.final_shift_m("left"):
+    for value in outcome.drawn["left"].shift_m:
         assert mm(value) in found
         assert f"{eye} {outcome.results.benefits[eye].depth}" in " ".join(found)
     assert outcome.results.eye_distance_m is not None
@@ -107,12 +116,64 @@ def test_the_verdict_says_that_trials_contradict_it(outcome: SessionOutcome) -> 
 
     accepted = dict.fromkeys(EYES, Verdict("accept", "as told"))
     outcome = replace(outcome, results=replace(outcome.results, verdicts=accepted))
-    said = ", but wrong by 20.7 arcmin in its trials (n = 1), over the lab's target of 8 arcmin"
-    assert f"Left eye accepted{said}: as told; right eye accepted: as told" in lead(
-        calibrated_shift_m=shift_m
-    )
+    said = "Good, but wrong by 20.7′ in its trials (n = 1; target 8′)"
+    assert f"Left eye: {said}" in lead(calibrated_shift_m=shift_m)
     assert said not in lead(calibrated_shift_m=shift_m + 1e-3), "a former calibration's"
-    assert said not in session_report(outcome).lead
+
+
+def test_the_answer_comes_first_and_agrees_with_the_files(
+    tmp_path: Path, verified: SessionRecord
+) -> None:
+    outcome = load_outcome(verified)
+    report = session_report(outcome)
+    answer = report.sections[0].items[0]
+    assert isinstance(answer, Table)
+    write_tables(tmp_path, table_rows(outcome))
+    with (tmp_path / "parameters.csv").open(encoding="utf-8", newline="") as file:
+        finals = [row for row in csv.DictReader(file) if row["final"] == "yes"]
+    for cells, row in zip(answer.rows, finals, strict=True):
+        assert cells[0] == row["eye"]
+        assert cells[1] == VERDICT_WORDS[row["verdict"]]  # type: ignore[index]
+        numbers = ("before_arcmin", "verification_found_arcmin", "expected_error_arcmin")
+        assert list(cells[2:5]) == [f"{float(row[name]):.1f}" for name in numbers]
+        assert cells[6] == row["verifications"]
+        assert cells[8].startswith(row["source"])
+        assert f"error {cells[4]}′" in report.lead
+    (listed,) = (one for one in report.sections if one.title == "Verifications")
+    (table,) = (one for one in listed.items if isinstance(one, Table))
+    assert [row[:4] for row in table.rows] == [[eye, "1", "+1.0", "−2.0"] for eye in EYES]
+
+
+def test_the_definition_of_the_expected_error_is_what_is_computed(outcome: SessionOutcome) -> None:
+    """The mean over the corners at all three distances, by drawing eyes from the covariance."""
+    distances = re.findall(r"\d\.\d", DEFINITIONS["expected error"])
+    assert "mean over the corners" in DEFINITIONS["expected error"]
+    assert outcome.results is not None
+    shift, display = outcome.results.eyes["left"], outcome.record.rig.eyes["left"]
+    rng = np.random.default_rng(0)
+    eyes_m = rng.multivariate_normal(shift.shift_m, shift.covariance_m2, 400)
+    errors = [
+        make_trial(display, "left", float(depth_m), shift.shift_m, eye_m).error_arcmin.mean()
+        for eye_m in eyes_m
+        for depth_m in distances
+    ]
+    assert len(distances) == 3
+    expected = outcome.expected_arcmin("left", "solved")
+    assert np.mean(errors) == pytest.approx(expected, rel=0.1)
+
+
+def test_only_settings_that_differ_from_the_defaults_are_listed(outcome: SessionOutcome) -> None:
+    def listed(settings: dict[str, Any]) -> object:
+        record = replace(outcome.record, settings=settings)
+        sections = session_report(replace(outcome, record=record)).sections
+        (section,) = (one for one in sections if one.title.startswith("Settings"))
+        (item,) = section.items
+        return [tuple(row) for row in item.rows] if isinstance(item, Table) else item
+
+    usual = outcome.record.settings
+    assert listed(usual) == "All settings are the defaults."
+    calibration = {**usual["calibration"], "steady_s": 9.5}
+    assert listed({"calibration": calibration}) == [("calibration.steady_s", "9.5")]
 
 
 @pytest.mark.parametrize("text", HOSTILE)
@@ -124,13 +185,26 @@ def test_no_name_or_note_breaks_it(tmp_path: Path, empty: SessionRecord, text: s
     assert [path.name for path in tmp_path.iterdir()] == ["report.pdf"]
 
 
-def test_it_says_what_was_simulated(empty: SessionRecord) -> None:
+def test_everything_says_what_was_simulated(tmp_path: Path, empty: SessionRecord) -> None:
     def simulated(**station: str) -> list[str]:
         settings = {**empty.settings, "station": station}
         outcome = load_outcome(replace(empty, settings=settings))
         [summary] = session_report(outcome).sections[0].items
         assert isinstance(summary, Table)
-        return [value for name, value in summary.rows if name == "Simulated"]
+        write_calibration_json(tmp_path / "c.json", outcome, 0.1, 10.0)
+        write_unity(tmp_path / "u.json", outcome, 0.1, 10.0)
+        write_openxr(tmp_path / "x.json", outcome)
+        write_calibration_yaml(tmp_path / "c.yaml", outcome)
+        write_tables(tmp_path, table_rows(outcome))
+        storage = cv2.FileStorage(str(tmp_path / "c.yaml"), cv2.FILE_STORAGE_READ)
+        with (tmp_path / "parameters.csv").open(encoding="utf-8", newline="") as file:
+            told = {row["simulated"] for row in csv.DictReader(file)}
+        told.add(storage.getNode("simulated").string())
+        for name in "cux":
+            told.add(json.loads((tmp_path / f"{name}.json").read_text())["simulated"])
+        shown = [value for name, value in summary.rows if name == "Simulated"]
+        assert told == (set(shown) or {""}), "every file says the same"
+        return shown
 
     assert simulated(source="simulator", headset="virtual") == ["camera, headset and wearer"]
     assert simulated(source="realsense", headset="virtual") == ["headset and wearer"]
@@ -146,8 +220,8 @@ def test_without_alignments_it_says_so(empty: SessionRecord) -> None:
 def test_verifications_alone_have_no_numbers_of_a_registration(verified: SessionRecord) -> None:
     sections = session_report(load_outcome(verified)).sections
     tables = (one for section in sections for one in section.items if isinstance(one, Table))
-    (solved,) = (one for one in tables if one.columns[1].title == "verdict")
-    assert [row[3:6] for row in solved.rows] == [["–", "–", "–"]] * 2
+    (solved,) = (one for one in tables if one.columns[1].title.startswith("expected error"))
+    assert [row[2:] for row in solved.rows] == [["–", "–", "–"]] * 2
 
 
 @pytest.mark.process

@@ -25,7 +25,7 @@ def test_every_alignment_has_a_scene_in_the_axes_of_its_first_eye(outcome: Sessi
         assert all(len(m) == len(scene.hand_m) for m in scene.residuals_m.values())
         first = scene.eyes[alignment.eyes[0]]
         assert first.offline_m == pytest.approx(np.zeros(3))
-        assert first.eye_m == pytest.approx(outcome.final_shift_m(alignment.eyes[0]))
+        assert first.eye_m == pytest.approx(outcome.drawn[alignment.eyes[0]].shift_m)
 
 
 def test_displays_and_eyes_stand_as_on_the_rig() -> None:

@@ -27,7 +27,7 @@ UP = np.diag([1.0, -1.0, -1.0])  # OpenGL's axes from OpenCV's
 
 def wanted_px(outcome: SessionOutcome, eye: Eye) -> Float64:
     T_V_H = outcome.record.rig.eyes[eye].T_V_H
-    P = outcome.projection(eye, outcome.final(eye)).P
+    P = outcome.projection(eye).P
     return project(P, transform(T_V_H, POINTS_H_M))
 
 
@@ -108,7 +108,7 @@ def test_slicer_finds_eyes_and_clouds(tmp_path: Path, outcome: SessionOutcome) -
     for eye in EYES:
         display = outcome.record.rig.eyes[eye]
         T = read_itk(tmp_path / f"{eye.capitalize()}EyeToHead.tfm")
-        P_H = outcome.projection(eye, outcome.final(eye)).P @ display.T_V_H
+        P_H = outcome.projection(eye).P @ display.T_V_H
         eye_H_m = -np.linalg.solve(P_H[:, :3], P_H[:, 3])
         np.testing.assert_allclose(T[:3, 3], slicer_points_mm(eye_H_m), atol=1e-9)
         ahead_H = display.T_V_H[:3, :3].T @ [0.0, 0.0, 1.0]  # anterior of the eye's frame

@@ -1,3 +1,4 @@
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -67,8 +68,8 @@ def test_a_surely_better_solution_within_the_target_is_accepted() -> None:
         gain = eye_benefit(RIG, _fused(shifts), eye)
         assert verdict.name == "accept"
         assert verdict.reason == (
-            f"expected error {gain.after_arcmin:.1f}′ instead of {gain.without_arcmin:.1f}′; "
-            "99\u00a0% sure to be better than none"
+            f"The expected error is {gain.after_arcmin:.1f}′ instead of "
+            f"{gain.without_arcmin:.1f}′. It is 99\u00a0% sure to be better than no calibration."
         )
         assert 1.0 < gain.after_arcmin < SETTINGS.target_arcmin < gain.without_arcmin
 
@@ -79,24 +80,24 @@ def test_a_surely_better_solution_within_the_target_is_accepted() -> None:
         (
             {"shift_m": np.array([0.0, 0.024, 0.007])},
             "implausible",
-            "the eye would lie 25 mm from the rig's viewpoint, beyond the 20 mm eye box; "
-            "check how the headset sits and the rig",
+            "The eye would lie 25 mm from the rig's viewpoint, beyond the 20 mm eye box. "
+            "Check how the headset sits, and the rig.",
         ),
         (
             {"converged": False, "stop_reason": "limit of 40 iterations"},
             "repeat",
-            "the registration did not converge (limit of 40 iterations)",
+            "The registration did not converge (limit of 40 iterations).",
         ),
         (
             {"inlier_ratio": 0.42},
             "repeat",
-            "only 42 % of the hand found its place on the cursor; "
-            "hold the hand in the cursor's shape",
+            "Only 42 % of the hand found its place on the cursor. "
+            "Hold the hand in the cursor's shape.",
         ),
         (
             {"rms_m": 0.0063},
             "repeat",
-            "hand and cursor differ by 6.3 mm; hold the hand in the cursor's shape",
+            "Hand and cursor differ by 6.3 mm. Hold the hand in the cursor's shape.",
         ),
     ],
 )
@@ -115,7 +116,7 @@ def test_eyes_too_near_or_too_far_apart(apart_mm: float, said: str) -> None:
     for verdict in _judge(shifts).values():
         assert verdict.name == "implausible"
         assert verdict.reason == (
-            f"the eyes would lie {said} mm apart; check the rig, or align one eye at a time"
+            f"The eyes would lie {said} mm apart. Check the rig, or align one eye at a time."
         )
 
 
@@ -126,7 +127,6 @@ def test_an_uncertain_eye_asks_for_alignments_and_leaves_the_other_alone() -> No
     advice = advise(RIG, _fused(shifts), "left", SETTINGS)
     assert verdicts["left"].name == "repeat"
     assert f"{advice.alignments} more alignment" in verdicts["left"].reason
-    assert f"{advice.after_arcmin:.1f}′ expected" in verdicts["left"].reason
     assert verdicts["right"].name == "accept"
 
 
@@ -143,7 +143,7 @@ def test_advice_is_the_fewest_alignments_that_are_enough() -> None:
     hopeless = advise(RIG, fused, "left", replace(SETTINGS, target_arcmin=0.1))
     assert not hopeless.meets_target
     verdict = _judge_fused(fused, replace(SETTINGS, target_arcmin=0.1))["left"]
-    assert verdict.reason.endswith("enter the eye distance, or verify each eye")
+    assert verdict.reason.endswith("Enter the eye distance, or verify each eye.")
 
 
 def test_advice_counts_the_plans_own_next_steps() -> None:
@@ -157,13 +157,14 @@ def test_advice_counts_the_plans_own_next_steps() -> None:
     )
     assert of_left.after_arcmin < of_right.after_arcmin
     told = judge(RIG, fused, {"left": advice, "right": advice}, SETTINGS)["left"].reason
-    assert told.endswith(f"expected after {advice.alignments} more alignments, 82\u00a0% sure")
+    assert f"After {advice.alignments} more alignments, " in told
+    assert told.endswith("82\u00a0% certainty can be expected.")
     check = Observation(np.eye(3, 6), np.zeros(3), np.zeros((3, 3)), 1e-8 * np.eye(3))
     verifiable = replace(fused, verifiable={"left": check})
     advice = advise(RIG, verifiable, "left", SETTINGS, ahead)
     assert (advice.alignments, advice.verify, advice.is_accepted) == (0, True, True)
     told = judge(RIG, verifiable, {"left": advice, "right": advice}, SETTINGS)["left"].reason
-    assert told.endswith("expected after verifying each eye")
+    assert "After verifying each eye, " in told
 
 
 def test_an_eye_that_alignments_cannot_decide_is_to_be_verified_again() -> None:
@@ -183,8 +184,27 @@ def test_an_eye_that_alignments_cannot_decide_is_to_be_verified_again() -> None:
     assert (advice.alignments, advice.verify, advice.is_accepted) == (0, True, False)
     told = judge(RIG, fused, {"left": advice}, SETTINGS)["left"].reason
     assert told.endswith(
-        f"after verifying this eye again, {percent(advice.probability_better)} sure"
+        f"After verifying this eye again, {percent(advice.probability_better)} certainty can be "
+        "expected."
     )
+
+
+@pytest.mark.parametrize("target_arcmin", [2.0, 8.0, 20.0])
+def test_no_error_is_foreseen_that_is_not_less_than_now(target_arcmin: float) -> None:
+    """What is missing may be certainty; then no error is said."""
+    uncertain = replace(
+        GOOD,
+        shift_m=np.array([0.0025, 0.0, 0.003]),
+        covariance_m2=np.diag([0.0009, 0.0009, 0.0014]) ** 2,
+    )
+    fused, settings = _fused({"left": uncertain}), replace(SETTINGS, target_arcmin=target_arcmin)
+    verdict = _judge_fused(fused, settings)["left"]
+    now_arcmin = eye_benefit(RIG, fused, "left").after_arcmin
+    assert verdict.name == "repeat"
+    _, _, foreseen = verdict.reason.partition("After ")
+    said = [float(number) for number in re.findall(r"([\d.]+)′", foreseen)]
+    assert all(arcmin < now_arcmin for arcmin in said)
+    assert bool(said) == (now_arcmin > target_arcmin)
 
 
 def test_a_verdict_tells_what_the_wearer_moved_and_what_it_changed() -> None:
@@ -200,8 +220,8 @@ def test_a_verdict_tells_what_the_wearer_moved_and_what_it_changed() -> None:
     advice: dict[Eye, Advice] = {"left": advise(RIG, fused, "left", SETTINGS)}
     told = judge(RIG, fused, advice, SETTINGS, verified={"left": found})["left"].reason
     assert told.startswith(
-        "the wearer moved the drawing by 5.0′ and +0.2 % in size; what is drawn has changed by "
-        f"{found.changed_arcmin:.1f}′ since; "
+        "The wearer moved the drawing by 5.0′ and +0.2 % in size. What is drawn has changed by "
+        f"{found.changed_arcmin:.1f}′ since. "
     )
     unmoved = _fused({"left": replace(GOOD, shift_m=np.array([0.0002, 0.0, 0.0]))})
     advice = {"left": advise(RIG, unmoved, "left", SETTINGS)}
@@ -233,20 +253,20 @@ def test_what_no_eye_explains_is_said_and_never_accepted() -> None:
     verdict = judge(RIG, fused, advice, SETTINGS)["left"]
     assert verdict.name == "repeat"
     assert verdict.reason.startswith(MISFIT)
-    assert "two verifications of this eye are 8.2′ apart" in verdict.reason
+    assert "Two verifications of this eye are 8.2′ apart." in verdict.reason
 
 
 def test_what_is_hardly_better_than_nothing_keeps_the_offline_calibration() -> None:
     unmoved = replace(GOOD, shift_m=np.array([0.0002, 0.0, 0.0]))
     verdict = _judge({"left": unmoved})["left"]
     assert verdict.name == "keep"
-    assert verdict.reason.startswith("the offline calibration is expected to err by only")
+    assert verdict.reason.startswith("The offline calibration is expected to err by only")
 
 
 def test_evidence_from_outside_contradicts_the_best_result() -> None:
     verdicts = _judge_fused(_fused({"left": GOOD, "right": GOOD}), SETTINGS, ["the picture froze"])
     assert {(verdict.name, verdict.reason) for verdict in verdicts.values()} == {
-        ("contradicted", "the picture froze")
+        ("contradicted", "The picture froze.")
     }
 
 

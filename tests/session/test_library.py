@@ -17,6 +17,7 @@ from handcal.session.library import (
     correct_wearer,
     delete_session,
     deleted_sessions,
+    deleted_together,
     read_library,
     restore_session,
 )
@@ -65,8 +66,7 @@ def test_an_entry_says_what_the_session_holds(make: Callable[..., Path], tmp_pat
     assert (left.verdict, left.expected_arcmin, left.remaining_arcmin) == ("accept", 7.5, 4.5)
     assert left.found_arcmin == 11.0
     assert (right.verdict, right.expected_arcmin, right.remaining_arcmin) == ("repeat", 16.0, None)
-    assert not entry.problem
-    assert not entry.damaged
+    assert (entry.problem, entry.damaged, entry.is_simulated) == ("", 0, False)
 
 
 def test_the_trials_of_an_eye_are_those_of_its_calibration(
@@ -204,6 +204,35 @@ def test_a_deleted_session_can_be_restored(make: Callable[..., Path], tmp_path: 
     assert {entry.wearer for entry in read_library(tmp_path)} == {"Bea", "Cid"}
     with pytest.raises(FileError, match="not in a folder"):
         restore_session(tmp_path / "one")
+
+
+def test_what_was_deleted_together_is_known_after_a_restart(
+    make: Callable[..., Path], tmp_path: Path
+) -> None:
+    paths = [make(name, "Ada") for name in ("one", "two", "three")]
+    delete_session(paths[0], 1_000_000_000)
+    for path in paths[1:]:
+        delete_session(path, 2_000_000_000)
+    deleted = deleted_sessions(tmp_path)
+    assert {path.name for path in deleted_together(deleted)} == {"two", "three"}
+    for path in deleted_together(deleted):
+        restore_session(path)
+    assert [path.name for path in deleted_together(deleted_sessions(tmp_path))] == ["one"]
+    assert deleted_together(()) == ()
+
+
+def test_a_session_in_which_nothing_was_done_is_empty(
+    make: Callable[..., Path], tmp_path: Path
+) -> None:
+    make("full", "Ada", solved=False)
+    for name in ("empty", "noted"):
+        with Session.create(tmp_path, example_rig(), {}, name=name) as session:
+            session.record("refused", reason="no hand")
+            if name == "noted":
+                session.save_notes("Glasses\noff")
+    entries = {entry.path.name: entry for entry in read_library(tmp_path)}
+    assert {name for name, entry in entries.items() if entry.is_empty} == {"empty"}
+    assert entries["noted"].notes == "Glasses off"
 
 
 def test_a_wearers_name_is_corrected_and_the_former_one_kept(

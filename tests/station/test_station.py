@@ -114,7 +114,7 @@ def test_a_novice_is_refused_then_calibrated(settings: StationSettings) -> None:
         assert set(station.headset.views) == set(EYES)
         stored = Session.open(station.session.path).facts.headset
         assert facts_json(stored) == facts_json(station.headset)
-        with pytest.raises(ProcedureError, match="solve the left eye"):
+        with pytest.raises(ProcedureError, match="solve and apply"):
             station.trials.save("left", 0.5)
         with pytest.raises(ProcedureError, match="solve and apply"):
             station.trials.show_target("left", 0.5)

@@ -46,7 +46,8 @@ class Conditions:
         self.is_slow = False
         self._is_usb = is_usb
         self._is_virtual = is_virtual
-        self._slow_text = ""
+        self._loses = False
+        self._is_camera = False  # it gives few frames, and none is lost in this computer
         self._rate_since_s: float | None = None
         self._dropped: deque[tuple[float, int]] = deque()
         self._problem, self._problem_since_s = "", 0.0
@@ -55,13 +56,15 @@ class Conditions:
         self._seen_s = 0.0
         self._has_started = False
 
-    def condition(self, snapshot: Snapshot) -> str:
+    def condition(self, snapshot: Snapshot, *, needs_frames: bool = True) -> str:
         """Return the message about the most important problem that lasts; empty if there is none.
 
         Parameters
         ----------
         snapshot : Snapshot
             The newest one.
+        needs_frames : bool
+            Whether few frames per second matter at the present step.
         """
         now_s = 1e-9 * snapshot.t_host_ns
         camera, link = snapshot.camera, snapshot.link
@@ -79,7 +82,7 @@ class Conditions:
             or link_problem
             or (_FEW_POSES if link.connected and link.pose_rate_hz < _FEW_POSES_HZ else "")
             or snapshot.contradiction
-            or self._slow_text
+            or (self._slow_text(camera.rate_hz) if needs_frames else "")
         )
         if found != self._problem:
             is_first = not self._problem
@@ -125,11 +128,25 @@ class Conditions:
             self._rate_since_s = now_s
         elif now_s - self._rate_since_s >= _SLOW_S:
             self.is_slow, self._rate_since_s = not self.is_slow, None
-            self._slow_text = ""
-            if self.is_slow:
-                # Frames that the camera counted, but nobody took, are lost in this computer.
-                is_camera = self._is_usb and lost_hz == 0.0
-                self._slow_text = _slow_text(rate_hz, is_camera=is_camera)
+            self._loses = loses and not is_few
+            # Frames that the camera counted, but nobody took, are lost in this computer.
+            self._is_camera = self._is_usb and lost_hz == 0.0
+
+    def _slow_text(self, rate_hz: float) -> str:
+        """Return the warning about few frames, with what it leads to; empty if there are enough."""
+        if not self.is_slow:
+            return ""
+        if rate_hz >= _SLOW_HZ and not self._loses:
+            return ""  # it is getting better
+        if self._loses:
+            return tr("fewer than two thirds of the camera's frames are used; close other programs")
+        advice = tr("close other programs")
+        if self._is_camera:
+            advice = tr("plug the camera into a USB 3 port")
+        text = tr(
+            "images per second: {:.0f} of the {:.0f} needed; {}, or confirmations may be refused"
+        )
+        return text.format(rate_hz, _SLOW_HZ, advice)
 
     def _lost_hz(self, camera: CameraStatus, now_s: float) -> float:
         """Return the frames per second that were lost recently."""
@@ -138,11 +155,3 @@ class Conditions:
             self._dropped.popleft()
         since_s, before = self._dropped[0]
         return (camera.dropped - before) / max(now_s - since_s, _LOST_OVER_S)
-
-
-def _slow_text(rate_hz: float, *, is_camera: bool) -> str:
-    """Return the warning; without the rate, which changes and which the camera panel shows."""
-    if rate_hz >= _SLOW_HZ:
-        return tr("fewer than two thirds of the camera's frames are used; close other programs")
-    advice = tr("plug the camera into a USB 3 port") if is_camera else tr("close other programs")
-    return tr("frames per second: often below the {:.0f} needed; {}").format(_SLOW_HZ, advice)

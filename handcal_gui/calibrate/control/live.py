@@ -10,9 +10,12 @@ from contextlib import suppress
 from functools import partial
 from typing import Literal
 
+import numpy as np
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from handcal.bridge.bridges import BridgeSettings
+from handcal.calibration.procedure import Calibration
+from handcal.calibration.states import ProcedureError, State
 from handcal.camera.clock import INFORM_NS
 from handcal.core.errors import FileError
 from handcal.link.server import HeadsetServer
@@ -21,29 +24,19 @@ from handcal.session.session import Session
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
 from handcal_gui.app.translation import tr
-from handcal_gui.calibrate.control.commands import COMMANDS, calibrating, connect_panels
-from handcal_gui.calibrate.control.compare import Comparison
 from handcal_gui.calibrate.control.conditions import Conditions
-from handcal_gui.calibrate.docks import Panel
 from handcal_gui.calibrate.guide.steps import Wizard
-from handcal_gui.calibrate.guide.view import ACTION_NAMES, Action, Step
+from handcal_gui.calibrate.guide.view import ACTION_NAMES, Action
 from handcal_gui.calibrate.guide.wizard import WizardPanel
+from handcal_gui.calibrate.sections import Panel
+from handcal_gui.calibrate.trials.panel import RECORD
 from handcal_gui.calibrate.window import MainWindow
-from handcal_gui.engine.engine_thread import Command, EngineThread
+from handcal_gui.engine.engine_thread import Command, EngineThread, calibrating
 
 _LOG = logging.getLogger(__name__)
 
 _POLL_MS = 25
 """A snapshot is shown as soon as it arrives; this is for one that was too early and stays."""
-_PANELS_OF_STEPS = {
-    Step.CONNECT: "link",
-    Step.SHOW_HAND: "results",
-    Step.ALIGN: "rotation",
-    Step.SOLVE: "results",
-    Step.VERIFY: "results",
-    Step.SAVE: "session",
-}
-"""The panel to show when a step begins."""
 _SLOW_EVERY = 2
 """On a slow computer, panels show only every such snapshot of those that the guide shows."""
 _NO_BRIDGES = BridgeSettings()
@@ -61,7 +54,6 @@ class CalibrationController(QObject):
     ----------
     window : MainWindow
     wizard_panel : WizardPanel
-    comparison : Comparison
 
     Attributes
     ----------
@@ -71,24 +63,20 @@ class CalibrationController(QObject):
         The engine ended; the reason, empty if it was closed.
     polled : Signal(Snapshot)
         The snapshot now shown.
-    export_requested, next_wearer_requested, slipped : Signal()
-        *slipped*: the headset has slipped; another session is to begin from this one.
+    on : dict of Action to callable
+        What the program does at actions that are not the engine's: *Export*, *Next wearer* and
+        *Headset slipped*.
     """
 
     opened = Signal(object)
     ended = Signal(str)
     polled = Signal(object)
-    export_requested = Signal()
-    next_wearer_requested = Signal()
-    slipped = Signal()
 
-    def __init__(
-        self, window: MainWindow, wizard_panel: WizardPanel, comparison: Comparison
-    ) -> None:
+    def __init__(self, window: MainWindow, wizard_panel: WizardPanel) -> None:
         super().__init__(window)
+        self.on: dict[Action, Callable[[], object]] = {}
         self._window = window
         self._wizard_panel = wizard_panel
-        self._comparison = comparison
         self._solve_settings = SolveSettings()
         self._engine: EngineThread | None = None
         self._link: HeadsetServer | None = None
@@ -98,7 +86,6 @@ class CalibrationController(QObject):
         self._conditions = Conditions()
         panels = window.panels
         self._turns: deque[Panel] = deque((panels.cloud, panels.wearer_view, wizard_panel.picture))
-        self._visible: set[object] = set()  # panels
         # Numbers of commands: the wizard's last one, and those in the snapshot shown.
         self._doing = self._shown = 0
         self._failed_command = self._failure = self._notes_problem = ""
@@ -146,9 +133,9 @@ class CalibrationController(QObject):
 
     def save_notes(self) -> str:
         """Save the notes now; return why they could not be saved, empty if they were."""
-        if self._engine is None or self._window.panels.session.notes_are_saved:
+        if self._engine is None or self._window.panels.session.notes.are_saved:
             return ""
-        self._window.panels.session.save_notes()
+        self._window.panels.session.notes.save_now()
         self._engine.settle(_SAVING_S)
         return self._notes_problem
 
@@ -162,11 +149,11 @@ class CalibrationController(QObject):
         """End the calibration and wait for it; safe to call twice."""
         self._timer.stop()  # no snapshot that is still on its way is shown
         self._saving.stop()
-        self._comparison.cancel()
+        self._window.panels.results.comparison.cancel()
         engine = self._engine
         if engine is not None:
             self._window.panels.fine_tune.settle()
-            self._window.panels.session.flush()
+            self._window.panels.session.notes.flush()
             engine.close()
             engine.deleteLater()
         self._engine = None
@@ -175,12 +162,8 @@ class CalibrationController(QObject):
 
     def do(self, action: Action) -> None:
         """Perform an action of the wizard, unless the previous one is still in progress."""
-        if action is Action.EXPORT:
-            self.export_requested.emit()
-        elif action is Action.NEXT_WEARER:
-            self.next_wearer_requested.emit()
-        elif action is Action.SLIPPED:
-            self.slipped.emit()
+        if action in self.on:
+            self.on[action]()
         elif self._snapshot is not None and self._shown >= self._doing:
             if action is Action.BACK:
                 self._wizard_panel.hold(True)  # or the step would run again
@@ -189,7 +172,7 @@ class CalibrationController(QObject):
                 # Before the plan can take another step.
                 self._hold_plan(self._wizard_panel.wizard.holds_plan)
                 self._wizard_panel.show_snapshot(self._snapshot)
-            if (command := COMMANDS.get(action)) is not None:
+            if (command := _COMMANDS.get(action)) is not None:
                 self._doing = self._submit(action.value, command)
 
     def _nudge(self, right_arcmin: float, down_arcmin: float, size: float) -> None:
@@ -205,7 +188,7 @@ class CalibrationController(QObject):
     def _go_back(self, to: Literal["offline", "former"]) -> None:
         """Have the headset draw with another φ."""
         self._hold_plan(self._wizard_panel.wizard.holds_plan)  # or it would send the newest again
-        self._submit(tr("go back"), calibrating(lambda calibration: calibration.go_back(to)))
+        self._submit(tr("go back"), lambda station: _go_back(station, to))
 
     def _connect(self) -> None:
         panels = self._window.panels
@@ -216,14 +199,15 @@ class CalibrationController(QObject):
             lambda eyes: self._submit(_CHOOSING, lambda station: station.plan.choose(eyes))
         )
         self._wizard_panel.step_changed.connect(self._on_step)
-        for name, dock in self._window.docks.items():
-            dock.visibilityChanged.connect(partial(self._catch_up, getattr(panels, name)))
-        panels.session.notes_changed.connect(self._save_notes)
-        asked, trials = self._wizard_panel.comparison, panels.trials
-        asked.ended.connect(trials.end_comparison_requested)
-        asked.show_requested.connect(trials.show_compared_requested)
-        asked.answered.connect(trials.comparison_answered)
-        connect_panels(panels, self._submit, self._on_doubted)
+        comparing = self._wizard_panel.comparison, panels.trials.comparison
+        for asking in (panels.fine_tune, panels.trials, panels.session, *comparing):
+            asking.submit = self._submit
+        panels.session.notes.save = self._save_notes
+        panels.trials.fine_tune = panels.fine_tune
+        panels.trials.doubted.connect(self._on_doubted)
+        panels.link.restart_headset.clicked.connect(
+            lambda: self._submit(tr("restart the headset"), Station.restart_headset)
+        )
 
     def _submit(self, name: str, command: Command) -> int:
         return self._engine.submit(name, command) if self._engine is not None else 0
@@ -236,17 +220,19 @@ class CalibrationController(QObject):
             return
         self._shown, self._shown_ns = shown, time.monotonic_ns()
         self._count += 1
-        condition = self._conditions.condition(snapshot)
+        condition = self._conditions.condition(
+            snapshot, needs_frames=self._wizard_panel.wizard.needs_frames(snapshot)
+        )
         snapshot = self._conditions.calm(snapshot)
         if self._snapshot is None or snapshot.record is not self._snapshot.record:
-            self._comparison.use(snapshot.record, self._solve_settings)
+            self._window.panels.results.comparison.use(snapshot.record, self._solve_settings)
             self._window.show_wearer(snapshot.record.wearer)
         self._snapshot = snapshot
         panels = self._window.panels
         # Even while hidden: they may be used before the next snapshot, or have a history.
         always: set[object] = {panels.fine_tune, panels.trials, panels.link}
         # The guide and the rotation panel advise the same: they never show different frames.
-        always |= {panels.rotation} & self._visible
+        always |= {panels.rotation} if panels.rotation.isVisible() else set()
         # Panels that are slow to paint take turns, so that the window never waits for all of them.
         self._wizard_panel.show_snapshot(snapshot)
         # Otherwise, on a slow computer, some panels would never have a turn.
@@ -254,14 +240,15 @@ class CalibrationController(QObject):
         if shows:
             self._turns.rotate()
         picture = self._wizard_panel.picture
-        turns = [one for one in self._turns if one is picture or one in self._visible]
+        turns = [one for one in self._turns if one.isVisible()] or [picture]
         for panel in (*panels.all(), picture):
-            is_due = panel is turns[0] if panel in self._turns else panel in self._visible
+            is_due = panel is turns[0] if panel in self._turns else panel.isVisible()
             if panel in always or (is_due and shows):
                 panel.show_snapshot(snapshot)
+        self._window.follow(snapshot)
         self._window.banner.show_condition(condition)
         self._hold_plan(self._wizard_panel.wizard.holds_plan)
-        self._watch_views(picture.wants_views or panels.wearer_view in self._visible)
+        self._watch_views(picture.wants_views or panels.wearer_view.isVisible())
         self.polled.emit(snapshot)
 
     def _is_shown(self, snapshot: Snapshot) -> bool:
@@ -274,15 +261,6 @@ class CalibrationController(QObject):
             return False
         is_soon = 0 <= snapshot.frame.t_host_ns - last.t_host_ns < INFORM_NS
         return is_soon and time.monotonic_ns() - self._shown_ns < 2 * INFORM_NS
-
-    def _catch_up(self, panel: Panel, is_visible: bool) -> None:
-        """Update a panel at once when it becomes visible."""
-        if not is_visible:
-            self._visible.discard(panel)
-            return
-        self._visible.add(panel)
-        if self._snapshot is not None:
-            panel.show_snapshot(self._snapshot)
 
     def _watch_views(self, wanted: bool) -> None:
         """Have the wearer's views rendered only while they are visible."""
@@ -311,7 +289,7 @@ class CalibrationController(QObject):
         panels.cloud.clear()
         self._wizard_panel.picture.begin()
         panels.fine_tune.set_rig(station.rig)
-        panels.results.show_results(None, {})
+        panels.results.show_results(None, None)
         panels.session.set_read_only(False)
         panels.trials.set_read_only(False)
         panels.link.show_pairing(
@@ -321,8 +299,7 @@ class CalibrationController(QObject):
         self._timer.start()
         self.opened.emit(station.session.path)
 
-    def _on_step(self, step: Step) -> None:
-        self._window.bring_up(_PANELS_OF_STEPS.get(step, ""))
+    def _on_step(self) -> None:
         if self._failure and self._window.banner.text == self._failure:
             self._window.banner.clear()  # the action has been taken elsewhere, or is obsolete
 
@@ -346,12 +323,12 @@ class CalibrationController(QObject):
         self._failure = text if name in set(Action) else ""
         self._window.banner.show_message(text)
 
-    def _on_doubted(self, name: str, why: str) -> None:
+    def _on_doubted(self, why: str) -> None:
         if not why:
-            if self._failed_command == name:
+            if self._failed_command == RECORD:
                 self._window.banner.clear()
             return
-        self._failed_command = name
+        self._failed_command = RECORD
         self._window.banner.show_message(tr("The trial is not recorded yet: {}").format(why))
 
     def _save_notes(self, text: str) -> None:
@@ -364,14 +341,14 @@ class CalibrationController(QObject):
 
     def _save_notes_again(self) -> None:
         """Try again what could not be saved, as when a disk was full."""
-        session = self._window.panels.session
-        if not session.notes_are_saved:
-            session.save_notes()
+        notes = self._window.panels.session.notes
+        if not notes.are_saved:
+            notes.save_now()
 
     def _on_ended(self, why: str) -> None:
         self._timer.stop()
         self._is_broken = bool(why)
-        self._window.panels.session.flush()  # text typed just before the end
+        self._window.panels.session.notes.flush()  # text typed just before the end
         self.ended.emit(why)
 
 
@@ -379,3 +356,60 @@ def _held(station: Station) -> Station:
     """Hold the plan of a station that was just opened, until the guide lets it go."""
     station.holds_plan = True
     return station
+
+
+def _confirm(calibration: Calibration) -> None:
+    """Confirm for the wearer, who may have done so already."""
+    if calibration.state is State.ALIGN:
+        calibration.confirm()
+
+
+def _take_step(station: Station) -> None:
+    """Take the plan's next step; the session keeps what it cannot write yet."""
+    with suppress(FileError):
+        station.take_step()
+
+
+def _skip(station: Station) -> None:
+    """Skip the verification, which the wearer may have ended already."""
+    with suppress(FileError, ProcedureError):
+        station.plan.skip()
+
+
+def _go_back(station: Station, to: Literal["offline", "former"]) -> None:
+    """Have the headset draw with another φ, which is not that of a trial."""
+    station.trials.hide_target()
+    with suppress(FileError):
+        station.calibration.go_back(to)
+
+
+def _use_kept(calibration: Calibration, *, is_used: bool) -> None:
+    """Draw with results that are no better than before, or with the offline calibration again."""
+    results = calibration.results
+    if results is None:
+        raise ProcedureError("there is no result")
+    kept = [eye for eye, one in results.verdicts.items() if one.name == "keep"]
+    calibration.set_shift(
+        {eye: results.eyes[eye].shift_m if is_used else np.zeros(3) for eye in kept}
+    )
+    calibration.record_shift()
+
+
+_COMMANDS: dict[Action, Command] = {
+    Action.TAKE_STEP: _take_step,
+    Action.CONFIRM: calibrating(_confirm),
+    Action.REDO: calibrating(Calibration.redo),
+    Action.VERIFIED: calibrating(Calibration.verified),
+    Action.UNDO_NUDGE: calibrating(Calibration.undo_nudge),
+    Action.SKIP: _skip,
+    Action.ANOTHER: lambda station: station.plan.request(),
+    Action.REPEAT_LEFT: lambda station: station.plan.request(("left",)),
+    Action.REPEAT_RIGHT: lambda station: station.plan.request(("right",)),
+    Action.WITHDRAW: lambda station: station.plan.withdraw(),
+    Action.VERIFY_LEFT: calibrating(lambda calibration: calibration.verify("left")),
+    Action.VERIFY_RIGHT: calibrating(lambda calibration: calibration.verify("right")),
+    Action.USE_ANYWAY: calibrating(partial(_use_kept, is_used=True)),
+    Action.KEEP_OFFLINE: calibrating(partial(_use_kept, is_used=False)),
+    Action.FINISH: Station.finish,
+}
+"""The engine's part of each action of the guide."""

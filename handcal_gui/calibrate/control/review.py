@@ -15,7 +15,6 @@ from handcal.register.results import Results, SolveSettings
 from handcal.session.record import replay
 from handcal.session.session import Session, SessionRecord
 from handcal_gui.app.translation import tr
-from handcal_gui.calibrate.control.compare import Comparison
 from handcal_gui.calibrate.review_page import ReviewPage
 from handcal_gui.calibrate.window import MainWindow
 from handcal_gui.engine.jobs import Job
@@ -39,7 +38,6 @@ class ReviewController(QObject):
     ----------
     window : MainWindow
     page : ReviewPage
-    comparison : Comparison
 
     Attributes
     ----------
@@ -53,11 +51,10 @@ class ReviewController(QObject):
     opened = Signal(object)
     failed = Signal(str)
 
-    def __init__(self, window: MainWindow, page: ReviewPage, comparison: Comparison) -> None:
+    def __init__(self, window: MainWindow, page: ReviewPage) -> None:
         super().__init__(window)
         self._window = window
         self._page = page
-        self._comparison = comparison
         self._job: Job | None = None
         self._progress: QProgressDialog | None = None
         self.record: SessionRecord | None = None
@@ -88,7 +85,7 @@ class ReviewController(QObject):
 
     def close(self) -> None:
         """Cancel opening and comparison, and close the session; safe to call twice."""
-        self._comparison.cancel()
+        self._window.panels.results.comparison.cancel()
         if self._job is not None:
             self._job.abandon()
             self._job = None
@@ -133,15 +130,14 @@ class ReviewController(QObject):
         panels = self._window.panels
         lack = _without_alignments(record)
         target_arcmin = stored.settings.verdict.target_arcmin
-        panels.results.show_results(stored.results, record.alignments, has_verdicts=False)
-        panels.results.show_trials(record, target_arcmin)
+        panels.results.show_results(stored.results, record, target_arcmin)
         panels.session.set_read_only(True)
         panels.session.show_record(record, stored.results)
         panels.trials.set_read_only(True)
         panels.trials.show_record(record)
         panels.cloud.clear(lack)  # of the session shown before
         if stored.results is not None:
-            self._comparison.use(record, stored.settings)
+            panels.results.comparison.use(record, stored.settings)
             for number, last in [*record.alignments.items()][-1:]:
                 self._show_alignment(number, last.eyes[0])
         # Then: if it is on the screen, it chooses the alignment whose clouds are shown.

@@ -2,36 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
-from PySide6.QtCore import QEvent, QObject, Qt, Signal
-from PySide6.QtGui import QAction, QActionGroup, QHideEvent, QKeyEvent
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtGui import (
+    QAction,
+    QActionGroup,
+    QHideEvent,
+    QKeyEvent,
+    QUndoCommand,
+    QUndoStack,
+    QWheelEvent,
+)
 from PySide6.QtWidgets import (
-    QAbstractButton,
-    QApplication,
     QButtonGroup,
     QComboBox,
+    QGridLayout,
     QHBoxLayout,
     QLabel,
-    QSizePolicy,
+    QRadioButton,
+    QSlider,
+    QToolButton,
     QWidget,
 )
 
 from handcal.calibration.states import MAX_HAND_SET_SHIFT_M
 from handcal.core.display import TARGET_DEPTHS_M, DrawnMove, effect_at
-from handcal.core.types import EYES, Eye, Rig
-from handcal.register.results import read_rendered_shift_m
+from handcal.core.types import EYES, Eye, Float64, Rig
+from handcal.report.cells import signed
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.keys import add_action
-from handcal_gui.app.theme import SPACING_PX, follow_theme, icon
+from handcal_gui.app.theme import SPACING_PX, follow_theme, icon, number_font
 from handcal_gui.app.translation import tr
-from handcal_gui.calibrate.fine_tune.controls_area import ControlsArea
-from handcal_gui.calibrate.fine_tune.editor import EyeShiftEditor
-from handcal_gui.calibrate.fine_tune.history import ShiftHistory, Shifts, moved, same_shifts
-from handcal_gui.calibrate.fine_tune.stream import Arrival, ShiftStream, find_obstacle
-from handcal_gui.widgets.fields import let_keys_choose, tool_button
+from handcal_gui.calibrate.fine_tune.stream import (
+    Arrival,
+    Shifts,
+    ShiftStream,
+    find_obstacle,
+    is_same_shifts,
+)
+from handcal_gui.engine.engine_thread import Submit, calibrating, no_engine
+from handcal_gui.widgets.fields import let_keys_choose, number, paragraph, tool_button
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.result_rows import EYE_NAMES
 
@@ -39,8 +52,11 @@ _CALIBRATED = tr(
     "The calibrated φ is the one with which the headset draws after the calibration: the solved "
     "φ, or 0 for an eye that keeps the offline calibration. A trial records its error."
 )
+_KEYS = tr("Arrow keys move the picture, PgUp and PgDn change its size. E changes the eye.")
 _OFFLINE: Shifts = {eye: np.zeros(3) for eye in EYES}
 _STEPS_MM = (0.1, 0.5, 1.0)
+_SLIDER_MAX_MM = 15.0
+_SLIDER_STEPS_PER_MM = 100
 _MOVES: dict[int, tuple[int, int]] = {
     Qt.Key.Key_Left: (0, 1),
     Qt.Key.Key_Right: (0, -1),
@@ -50,12 +66,31 @@ _MOVES: dict[int, tuple[int, int]] = {
     Qt.Key.Key_PageUp: (2, 1),
 }
 """Axis and direction of φ, opposite to the picture's, which moves in the key's direction."""
+_DIRECTIONS = (
+    tr("to the right of the rig's viewpoint (φ1); negative is to the left"),
+    tr("below the rig's viewpoint (φ2); negative is above"),
+    tr("in front of the rig's viewpoint, towards the display (φ3); negative is behind"),
+)
 _ARRIVALS = {
     Arrival.SENDING: ("wait", tr("Sending to the headset…")),
-    Arrival.ARRIVED: ("check", tr("In the headset. ← → φ1, ↑ ↓ φ2, PgUp PgDn φ3, E eye")),
+    Arrival.ARRIVED: ("check", tr("In the headset.")),
     Arrival.LATE: ("warning", tr("Not acknowledged by the headset; see Link")),
 }
 _NO_SESSION = tr("Fine-tuning starts with a session.")
+_FOR_TRIAL = tr("For the trial only: afterwards the final φ is drawn again.")
+
+
+def moved(shifts_m: Shifts, eyes: Sequence[Eye], axis: int, by_m: float) -> Shifts:
+    """Return the shifts with one component of some eyes moved by the same amount.
+
+    The step is reduced if an eye would otherwise exceed the limit.
+    """
+    limit_m = MAX_HAND_SET_SHIFT_M
+    lowest_m = max(-limit_m - shifts_m[eye][axis] for eye in eyes)
+    highest_m = min(limit_m - shifts_m[eye][axis] for eye in eyes)
+    step_m = np.zeros(3)
+    step_m[axis] = min(max(by_m, lowest_m), highest_m)
+    return {**shifts_m, **{eye: np.clip(shifts_m[eye] + step_m, -limit_m, limit_m) for eye in eyes}}
 
 
 class FineTunePanel(QWidget):
@@ -65,32 +100,31 @@ class FineTunePanel(QWidget):
     ----------
     reset_action : QAction
         Sets φ to the solved one.
-    shift_changed : Signal(object)
-        φ of both eyes, a mapping of eye to (3,) metres, for the headset; at most 30 times a second.
-    shift_settled : Signal()
-        The last φ sent has been unchanged for 0.7 s and should be stored.
+    submit : callable
+        Gives the engine a command.
     """
-
-    shift_changed = Signal(object)
-    shift_settled = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("fineTune")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.submit: Submit = no_engine
         self._rig: Rig | None = None
         self._solved: Shifts = {}
         self._calibrated: Shifts = {}
+        self._present: Shifts = _OFFLINE  # as set, whatever is shown for comparison
         self._obstacle = _NO_SESSION
-        self._history = ShiftHistory(_OFFLINE)
-        self._burst: object = None
         self._sign_name = "wait"
+        self._history = QUndoStack(self)
+        self._history.indexChanged.connect(self._refresh)
+        self._burst = 0  # changes of one burst are undone together
+        self._burst_of: tuple[tuple[Eye, ...], int] | None = None
         self._stream = ShiftStream(self)
-        self._stream.sent.connect(self.shift_changed)
-        self._stream.settled.connect(self._end_burst)
-        self._make_editors()
+        self._stream.sent.connect(
+            lambda shifts_m: self.submit(tr("set φ"), calibrating(lambda c: c.set_shift(shifts_m)))
+        )
+        self._stream.settled.connect(self._record)
         self._make_actions()
-        self._make_depths()
         self._lay_out()
         follow_theme(self, self._draw_icons)
         self._steps.actions()[0].trigger()
@@ -103,30 +137,21 @@ class FineTunePanel(QWidget):
         step_m: float = self._steps.checkedAction().data()
         return step_m
 
+    @property
+    def is_touched(self) -> bool:
+        """True if φ was moved by hand since others set it, or since a trial began."""
+        return self._history.canUndo()
+
     def set_step_m(self, step_m: float) -> None:
         """Select the nearest available step."""
         min(self._steps.actions(), key=lambda step: abs(step.data() - step_m)).trigger()
 
     def set_rig(self, rig: Rig) -> None:
-        """Start with another wearer or headset.
-
-        Parameters
-        ----------
-        rig : Rig
-            The offline calibration of the displays.
-        """
+        """Start with another wearer or headset, with the offline calibration of the displays."""
         self._rig = rig
         self._stream.begin()
         self._obstacle = _NO_SESSION  # until its φ is known
-        self._begin(ShiftHistory(_OFFLINE))
-        self._refresh()
-
-    def shift_m(self) -> Shifts:
-        """Return φ of each eye, (3,), metres, as set here, and in the headset a little later.
-
-        It is empty until it is known.
-        """
-        return {} if self._obstacle == _NO_SESSION else self._history.present
+        self._begin(_OFFLINE)
 
     def choose_eye(self, eye: Eye) -> None:
         """Let the keys move this eye."""
@@ -136,39 +161,31 @@ class FineTunePanel(QWidget):
         """Send φ as set at once, and end any comparison."""
         if self._shown() is not None:
             self._stop_showing()
-            self._stream.preview(self._history.present)
+            self._stream.preview(self._present)
             self._refresh()
         self._stream.flush()
+
+    def begin_trial(self) -> None:
+        """Forget the changes that were made for the trial before."""
+        self._history.clear()
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the headset's φ, unless it was set here, and whether it has arrived."""
         results = snapshot.procedure.results
         solved = {eye: shift.shift_m for eye, shift in results.eyes.items()} if results else {}
-        calibrated = results.rendered_shift_m if results else {}
+        calibrated = dict(results.rendered_shift_m) if results else {}
         obstacle = find_obstacle(snapshot)
-        is_new = self._stream.see(snapshot)
-        if is_new:
-            applied, by_hand = snapshot.procedure.applied_shift_m, snapshot.record.set_by_hand_m
-            if self._obstacle == _NO_SESSION and same_shifts({**applied, **by_hand}, applied):
-                stored = read_rendered_shift_m(snapshot.record.results)
-                self._history = ShiftHistory({**_OFFLINE, **stored}, by_hand)
-            self._history.see(applied)
-            self._begin(self._history)
-        is_same = same_shifts(solved, self._solved) and same_shifts(calibrated, self._calibrated)
+        if is_new := self._stream.see(snapshot):
+            self._take_from_others(snapshot)
+        is_same = is_same_shifts(solved, self._solved) and is_same_shifts(
+            calibrated, self._calibrated
+        )
         if is_new or obstacle != self._obstacle or not is_same:
             self._obstacle, self._solved, self._calibrated = obstacle, solved, calibrated
             self._refresh()
-        arrival = self._stream.arrival
-        sign, text = ("wait", obstacle) if obstacle else _ARRIVALS[arrival]
-        can_move = self._is_editable() and arrival is Arrival.ARRIVED
-        if can_move and self._history.is_replaced:
-            sign, text = "wait", tr("The φ you set was replaced. Ctrl+Z brings it back.")
-            if not self._has_keys():
-                text = tr("The φ you set was replaced. Ctrl+6, then Ctrl+Z brings it back.")
-        elif can_move and not self._has_keys():
-            sign, text = "fine-tune", tr("Ctrl+6, then ← → φ1, ↑ ↓ φ2, PgUp PgDn φ3, E eye")
-            if self._area.shows_keys:
-                text = tr("Ctrl+6, then the keys above")
+        sign, text = ("wait", obstacle) if obstacle else _ARRIVALS[self._stream.arrival]
+        if snapshot.trial_eye is not None and not obstacle:
+            text = f"{text} {_FOR_TRIAL}"
         self._show_status(sign, text)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -181,62 +198,50 @@ class FineTunePanel(QWidget):
             eye = next(eye for eye in EYES if self._editors[eye].chosen.isChecked())
             self._move(eye, axis, direction * self.step_m)
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Take the arrow keys from buttons, which would pass the focus on."""
-        if not (isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress):
-            return super().eventFilter(watched, event)
-        is_move = event.key() in _MOVES
-        if is_move:
-            self.keyPressEvent(event)
-        return is_move
-
     def hideEvent(self, event: QHideEvent) -> None:
         """End any comparison, so that the headset keeps φ as set."""
         super().hideEvent(event)
         self.settle()
 
-    def _has_keys(self) -> bool:
-        focused = QApplication.focusWidget()
-        return focused is self or (focused is not None and self.isAncestorOf(focused))
+    def draw(self, shifts_m: Shifts) -> None:
+        """Set φ; what is drawn already is not sent again."""
+        if not is_same_shifts(shifts_m, self._present):
+            self._present = shifts_m
+            self._stream.send(shifts_m)
 
-    def _draw_icons(self) -> None:
-        for action, name in ((self._undo, "undo"), (self._redo, "redo")):
-            action.setIcon(icon(name))
-        self._sign.setPixmap(icon(self._sign_name).pixmap(2 * SPACING_PX))
-
-    def _begin(self, history: ShiftHistory) -> None:
-        self._history = history
-        self._burst = None
+    def _take_from_others(self, snapshot: Snapshot) -> None:
+        """Show φ that was set elsewhere; what was set here is an undo away, except a trial's."""
+        former, self._present = self._present, dict(snapshot.procedure.applied_shift_m)
         self._stop_showing()
+        if snapshot.trial_eye is not None or not self._history.canUndo():
+            self._history.clear()
+        else:
+            self._history.push(_Change(self, former, self._present, -1))
+
+    def _begin(self, shifts_m: Shifts) -> None:
+        self._present = shifts_m
+        self._stop_showing()
+        self._history.clear()
+        self._refresh()
 
     def _edit(self, eye: Eye, axis: int, value_m: float) -> None:
-        self._move(eye, axis, value_m - float(self._history.present[eye][axis]))
+        self._move(eye, axis, value_m - float(self._present[eye][axis]))
 
     def _move(self, eye: Eye, axis: int, by_m: float) -> None:
         eyes = EYES if self._both.isChecked() else (eye,)
-        shifts_m = moved(self._history.present, eyes, axis, by_m, MAX_HAND_SET_SHIFT_M)
-        burst = (eyes, axis)
-        self._history.change(shifts_m, goes_on=burst == self._burst)
-        self._burst = burst
-        self._send_present()
+        if (eyes, axis) != self._burst_of:
+            self._burst, self._burst_of = self._burst + 1, (eyes, axis)
+        self._change(moved(self._present, eyes, axis, by_m), self._burst)
 
-    def _reset(self, shifts_m: Shifts) -> None:
-        self._burst = None
-        self._history.change({**self._history.present, **shifts_m})
-        self._send_present()
+    def _change(self, shifts_m: Shifts, burst: int = -1) -> None:
+        if burst < 0:
+            self._burst_of = None
+        if not is_same_shifts(shifts_m, self._present):
+            self._history.push(_Change(self, self._present, shifts_m, burst))
 
-    def _go(self, step: Callable[[], None]) -> None:
-        self._burst = None
-        step()
-        self._send_present()
-
-    def _send_present(self) -> None:
-        self._stream.send(self._history.present)
-        self._refresh()
-
-    def _end_burst(self) -> None:
-        self._burst = None
-        self.shift_settled.emit()
+    def _record(self) -> None:
+        self._burst_of = None
+        self.submit(tr("record φ"), lambda station: station.trials.record_shift())
 
     def _show(self) -> None:
         self._stream.flush()
@@ -251,7 +256,7 @@ class FineTunePanel(QWidget):
 
     def _drawn(self) -> Shifts:
         """Return the φ that the headset is to draw with: the one set, or shown for comparison."""
-        return {**self._history.present, **(self._shown() or {})}
+        return {**self._present, **(self._shown() or {})}
 
     def _stop_showing(self) -> None:
         for action in (self._show_solved, self._show_offline):
@@ -264,10 +269,9 @@ class FineTunePanel(QWidget):
         is_editable, is_ready = self._is_editable(), not self._obstacle
         for eye, editor in self._editors.items():
             editor.setEnabled(is_editable)
-            editor.show_shift(self._drawn()[eye])
-            editor.show_effect(self._effect(eye))
-        self._undo.setEnabled(is_editable and self._history.can_undo)
-        self._redo.setEnabled(is_editable and self._history.can_redo)
+            editor.show_shift(self._drawn()[eye], self._effect(eye))
+        self._undo.setEnabled(is_editable and self._history.canUndo())
+        self._redo.setEnabled(is_editable and self._history.canRedo())
         self._reset_offline.setEnabled(is_editable)
         self.reset_action.setEnabled(is_editable and bool(self._solved))
         self._show_offline.setEnabled(is_ready)
@@ -287,17 +291,13 @@ class FineTunePanel(QWidget):
     def _show_status(self, icon_name: str, text: str) -> None:
         if (icon_name, text) != (self._sign_name, self._status.text()):
             self._sign_name = icon_name
-            self._sign.setPixmap(icon(icon_name).pixmap(2 * SPACING_PX))
             self._status.setText(text)
+            self._draw_icons()
 
-    def _make_editors(self) -> None:
-        self._editors = {eye: EyeShiftEditor(EYE_NAMES[eye], MAX_HAND_SET_SHIFT_M) for eye in EYES}
-        self._eye_choice = QButtonGroup(self)
-        for eye, editor in self._editors.items():
-            editor.setObjectName(f"{eye}Editor")
-            editor.edited.connect(partial(self._edit, eye))
-            self._eye_choice.addButton(editor.chosen)
-        self._editors["left"].chosen.setChecked(True)
+    def _draw_icons(self) -> None:
+        for action, name in ((self._undo, "undo"), (self._redo, "redo")):
+            action.setIcon(icon(name))
+        self._sign.setPixmap(icon(self._sign_name).pixmap(2 * SPACING_PX))
 
     def _change_eye(self) -> None:
         next(e.chosen for e in self._editors.values() if not e.chosen.isChecked()).setChecked(True)
@@ -306,10 +306,10 @@ class FineTunePanel(QWidget):
         add = self._add_action
         self._undo = add(tr("Undo"), "Ctrl+Z", tr("Undo the last change"))
         self._undo.setObjectName("undo")
-        self._undo.triggered.connect(lambda: self._go(self._history.undo))
+        self._undo.triggered.connect(self._history.undo)
         self._redo = add(tr("Redo"), "Ctrl+Shift+Z", tr("Redo the change"))
         self._redo.setObjectName("redo")
-        self._redo.triggered.connect(lambda: self._go(self._history.redo))
+        self._redo.triggered.connect(self._history.redo)
         self._both = add(tr("Both eyes"), "L", tr("Move both eyes by the same amount"))
         self._both.setCheckable(True)
         self.reset_action = add(
@@ -317,16 +317,11 @@ class FineTunePanel(QWidget):
             "Shift+S",
             tr("Set φ to the one solved from the alignments, used or not"),
         )
-        self.reset_action.triggered.connect(lambda: self._reset(self._solved))
+        self.reset_action.triggered.connect(lambda: self._change({**self._present, **self._solved}))
         self._reset_offline = add(
             tr("Reset to offline"), "Shift+B", tr("Set φ to 0, the offline calibration")
         )
-        self._reset_offline.triggered.connect(lambda: self._reset(_OFFLINE))
-        self.reset_action.setIconText(tr("Solved"))
-        self._reset_offline.setIconText(tr("Offline"))
-        looks = QActionGroup(self)
-        looks.setExclusionPolicy(QActionGroup.ExclusionPolicy.ExclusiveOptional)
-        looks.triggered.connect(self._show)
+        self._reset_offline.triggered.connect(lambda: self._change(_OFFLINE))
         self._show_solved = add(
             tr("Show solved"),
             "S",
@@ -335,8 +330,16 @@ class FineTunePanel(QWidget):
         self._show_offline = add(
             tr("Show offline"), "B", tr("Show φ = 0 in the headset while checked")
         )
-        self._show_solved.setIconText(tr("Solved"))
-        self._show_offline.setIconText(tr("Offline"))
+        looks = QActionGroup(self)
+        looks.setExclusionPolicy(QActionGroup.ExclusionPolicy.ExclusiveOptional)
+        looks.triggered.connect(self._show)
+        for action, text in (
+            (self.reset_action, tr("Solved")),
+            (self._reset_offline, tr("Offline")),
+            (self._show_solved, tr("Solved")),
+            (self._show_offline, tr("Offline")),
+        ):
+            action.setIconText(text)
         for action in (self._show_solved, self._show_offline):
             action.setCheckable(True)
             looks.addAction(action)
@@ -357,7 +360,12 @@ class FineTunePanel(QWidget):
         for editor in self._editors.values():
             editor.set_step_mm(1e3 * self.step_m)
 
-    def _make_depths(self) -> None:
+    def _lay_out(self) -> None:
+        self._editors = {eye: _EyeEditor(eye, partial(self._edit, eye)) for eye in EYES}
+        eye_choice = QButtonGroup(self)
+        for editor in self._editors.values():
+            eye_choice.addButton(editor.chosen)
+        self._editors["left"].chosen.setChecked(True)
         self._depth = QComboBox()
         self._depth.setAccessibleName(tr("Distance of the target"))
         self._depth.setToolTip(tr("Distance of the target from the eye, in metres"))
@@ -365,35 +373,134 @@ class FineTunePanel(QWidget):
             self._depth.addItem(f"{depth_m:g} m", depth_m)
         self._depth.currentIndexChanged.connect(self._refresh)
         let_keys_choose(self._depth, self, tr("Next distance of the target"), "D")
-
-    def _lay_out(self) -> None:
         self._against = QLabel()
         self._against.setToolTip(_CALIBRATED)
-        self._sign, self._status = QLabel(), QLabel(wordWrap=True)
-        self._status.setObjectName("status")
-        self._status.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        self._sign, self._status = QLabel(), paragraph("status")
         steps, changes = self._steps.actions(), (self._undo, self._redo)
         show, reset = QLabel(tr("Show")), QLabel(tr("Reset to"))
-        controls = vbox(
+        vbox(
             _row(QLabel(tr("Step")), *steps, QLabel("mm"), None, self._both, *changes),
             _row(self._editors["left"], self._editors["right"]),
             _row(QLabel(tr("Effect at")), self._depth, self._against, None),
-            _row(
-                *(show, self._show_solved, self._show_offline, None),
-                *(reset, self.reset_action, self._reset_offline),
-                spacing=SPACING_PX // 4,
-            ),
+            _row(show, self._show_solved, self._show_offline, None),
+            _row(reset, self.reset_action, self._reset_offline, None),
+            paragraph("keys", _KEYS),
+            hbox(self._sign, (self._status, 1), spacing=SPACING_PX),
+            0,
+            on=self,
+            margins=SPACING_PX,
             spacing=SPACING_PX // 2,
         )
-        status = _row(self._sign, self._status)
-        status.setContentsMargins(SPACING_PX, 0, SPACING_PX, SPACING_PX // 4)
-        self._area = ControlsArea(controls)
-        vbox((self._area, 1), status, 0, on=self, margins=0)
-        for one in self.findChildren(QAbstractButton):
-            one.installEventFilter(self)
 
 
-def _row(*items: QWidget | QAction | None, spacing: int = SPACING_PX) -> QHBoxLayout:
+class _Change(QUndoCommand):
+    """A change of φ; those of one burst, as when a slider is dragged, are one."""
+
+    def __init__(self, panel: FineTunePanel, before: Shifts, after: Shifts, burst: int) -> None:
+        super().__init__(tr("φ"))
+        self._panel, self._before, self._after, self._burst = panel, before, after, burst
+
+    def id(self) -> int:
+        return self._burst
+
+    def mergeWith(self, other: QUndoCommand) -> bool:
+        assert isinstance(other, _Change)
+        self._after = other._after
+        return True
+
+    def redo(self) -> None:
+        self._panel.draw(self._after)
+
+    def undo(self) -> None:
+        self._panel.draw(self._before)
+
+
+class _Slider(QSlider):
+    """A slider that the wheel scrolls past: scrolling the panels must not change φ."""
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        event.ignore()
+
+
+class _EyeEditor(QWidget):
+    """φ of one eye in fields and sliders, with its effect on the drawn target."""
+
+    edited = Signal(int, float)
+
+    def __init__(self, eye: Eye, edit: object) -> None:
+        super().__init__()
+        self.setObjectName(f"{eye}Editor")
+        self.edited.connect(edit)
+        title = EYE_NAMES[eye]
+        self.chosen = QRadioButton(title)
+        self.chosen.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # or it would take the arrow keys
+        self.chosen.setToolTip(tr("The arrow keys move this eye (E changes)"))
+        grid = QGridLayout()
+        grid.setVerticalSpacing(SPACING_PX // 4)
+        grid.setHorizontalSpacing(SPACING_PX // 2)
+        grid.setColumnStretch(2, 1)
+        self._fields, self._sliders = [], []
+        limit_mm, reach = 1e3 * MAX_HAND_SET_SHIFT_M, round(_SLIDER_STEPS_PER_MM * _SLIDER_MAX_MM)
+        for axis in range(3):
+            meaning = tr("Distance of the eye {}, in millimetres").format(_DIRECTIONS[axis])
+            field = number(f"phi{axis + 1}", -limit_mm, limit_mm, 0.05, " mm", meaning)
+            field.setAccessibleName(tr("{} φ{} in millimetres").format(title, axis + 1))
+            field.setFont(number_font())
+            field.setKeyboardTracking(False)
+            field.valueChanged.connect(lambda mm, axis=axis: self.edited.emit(axis, 1e-3 * mm))
+            slider = _Slider(Qt.Orientation.Horizontal)
+            slider.setObjectName(f"slider{axis + 1}")
+            slider.setAccessibleName(f"{title} φ{axis + 1}")
+            slider.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+            slider.setRange(-reach, reach)
+            slider.setMinimumWidth(3 * SPACING_PX)
+            slider.valueChanged.connect(
+                lambda steps, axis=axis: self.edited.emit(axis, 1e-3 * steps / _SLIDER_STEPS_PER_MM)
+            )
+            grid.addWidget(QLabel(f"φ{axis + 1}"), axis, 0)
+            grid.addWidget(field, axis, 1)
+            grid.addWidget(slider, axis, 2)
+            self._fields.append(field)
+            self._sliders.append(slider)
+        self._effect = QLabel()
+        self._effect.setObjectName("effect")
+        self._effect.setFont(number_font())
+        self._effect.setToolTip(
+            tr("Shift and enlargement of the drawn target, relative to the φ compared with")
+        )
+        vbox(self.chosen, grid, self._effect, on=self, margins=0, spacing=SPACING_PX // 4)
+
+    def show_shift(self, shift_m: Float64, effect: DrawnMove | None) -> None:
+        """Show φ, (3,), metres, and the target's movement on the display; nothing is emitted."""
+        for value_m, field, slider in zip(shift_m, self._fields, self._sliders, strict=True):
+            value_mm = 1e3 * float(value_m)
+            with QSignalBlocker(field), QSignalBlocker(slider):
+                field.setValue(value_mm)
+                slider.setValue(round(_SLIDER_STEPS_PER_MM * value_mm))
+        if effect is not None:
+            rows = (
+                (tr("Right"), effect.right_px, effect.right_arcmin),
+                (tr("Up"), effect.up_px, effect.up_arcmin),
+            )
+            lines = [f"{name} {signed(px, 1)} px {signed(at, 1)}′" for name, px, at in rows]
+            lines.append(tr("Size {} %").format(signed(100 * (effect.size_ratio - 1), 2)))
+            self._effect.setText("\n".join(lines))
+
+    def set_step_mm(self, step_mm: float) -> None:
+        """Set the step of the fields' arrows and of clicks beside a slider's handle."""
+        for field, slider in zip(self._fields, self._sliders, strict=True):
+            field.setSingleStep(step_mm)
+            slider.setPageStep(round(_SLIDER_STEPS_PER_MM * step_mm))
+
+
+def _row(*items: QWidget | QAction | None) -> QHBoxLayout:
     """Return a row of widgets and buttons for actions; None is a stretch."""
-    made = (tool_button(one) if isinstance(one, QAction) else one or 1 for one in items)
-    return hbox(*made, spacing=spacing)
+    made: list[QWidget | int] = []
+    for one in items:
+        if isinstance(one, QAction):
+            button: QToolButton = tool_button(one)
+            button.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # or it would take the arrow keys
+            made.append(button)
+        else:
+            made.append(one or 1)
+    return hbox(*made, spacing=SPACING_PX // 2)

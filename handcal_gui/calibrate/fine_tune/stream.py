@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from enum import Enum
+from typing import TypeAlias
 
+import numpy as np
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from handcal.calibration.states import State
+from handcal.core.types import Eye, Float64
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.translation import tr
-from handcal_gui.calibrate.fine_tune.history import Shifts, same_shifts
 
+Shifts: TypeAlias = Mapping[Eye, Float64]
+"""φ of each eye, (3,) float64, metres."""
 PERIOD_MS = 33
 SETTLE_MS = 700
 _LATE_NS = 2_000_000_000
@@ -96,7 +101,7 @@ class ShiftStream(QObject):
         else:
             is_late = snapshot.t_host_ns - self._sent_ns > _LATE_NS
             self.arrival = Arrival.LATE if is_late else Arrival.SENDING
-        if not is_answered or same_shifts(self._newest, procedure.applied_shift_m):
+        if not is_answered or is_same_shifts(self._newest, procedure.applied_shift_m):
             return False
         self._newest = procedure.applied_shift_m
         self._calm.stop()
@@ -105,6 +110,11 @@ class ShiftStream(QObject):
     def _send(self) -> None:
         self._sent_ns, self._seen_since = time.monotonic_ns(), 0
         self.sent.emit(self._newest)
+
+
+def is_same_shifts(one: Shifts, other: Shifts) -> bool:
+    """Return whether both hold the same eyes with the same φ."""
+    return set(one) == set(other) and all(np.array_equal(one[eye], other[eye]) for eye in one)
 
 
 def _timer(parent: QObject, interval_ms: int) -> QTimer:

@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 from handcal_gui.app.keys import add_action, native
 from handcal_gui.app.theme import SPACING_PX, colors, follow_theme
 from handcal_gui.app.translation import tr
-from handcal_gui.calibrate.guide.view import ButtonSpec, WizardView
+from handcal_gui.calibrate.guide.view import MOST_OTHERS, ButtonSpec, WizardView
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import main_button, with_name
 from handcal_gui.widgets.key_cap import KeyCap
@@ -31,7 +31,6 @@ _KEYS = {
     f"{_TEXT_KEY} Ctrl+Enter": tr("Press the large button from anywhere"),
 }
 _LONGEST_LABEL = tr("Confirm for the wearer")
-_MOST_OTHERS = 3
 _ARMING_MS = 700
 """Delay before a new button can discard data: a click on its predecessor must not trigger it."""
 
@@ -64,7 +63,7 @@ class ActionBar(QWidget):
         )
         self._key = KeyCap("wizardMainKey", _KEY, _TEXT_KEY)
         self._why_quiet = with_name(ElidedLabel(), "wizardMainQuiet")
-        self._others = [with_name(QPushButton(), f"wizardOther{i}") for i in range(_MOST_OTHERS)]
+        self._others = [with_name(QPushButton(), f"wizardOther{i}") for i in range(MOST_OTHERS)]
         self._arming = QTimer(self, interval=_ARMING_MS, singleShot=True)
         self._lay_out()
         self._main.clicked.connect(lambda: self._ask(self._view.main if self._view else None))

@@ -2,31 +2,37 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QRectF, Qt, QTimer
-from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QLabel, QStackedLayout, QWidget
+from collections.abc import Mapping
+
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QPagedPaintDevice, QTextDocument
+from PySide6.QtWidgets import QLabel, QStackedLayout, QWidget
 
 from handcal.core.types import EYES, Eye, Frame
 from handcal.hand.overlay import contour_px
+from handcal.register.results import Results
+from handcal.register.verdict import VerdictSettings
+from handcal.session.session import SessionRecord
 from handcal.station.snapshot import Snapshot
+from handcal_gui.app.keys import add_action
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
 from handcal_gui.calibrate.camera.hand_overlay import HandOverlay
-from handcal_gui.calibrate.guide.result_bar import ResultBar
 from handcal_gui.calibrate.guide.view import Step
 from handcal_gui.calibrate.parts.missing import missing_view_text
+from handcal_gui.calibrate.parts.result_card import ResultCard, result_text
 from handcal_gui.calibrate.wearer_view.eye_canvas import EyeCanvas, show_alike
 from handcal_gui.calibrate.wearer_view.panel import origin_text, outline_legend
+from handcal_gui.widgets.brief import copy_text
+from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.printing import ask_printer
 from handcal_gui.widgets.result_rows import EYE_NAMES
+from handcal_gui.widgets.times import local_time
 
 _BLINK_MS = 800
 _LEAST_PX = 80, 48
-_ANY_HEIGHT_PX = 16_777_215
-"""Qt's largest height of a widget."""
-_ASPECT = 0.8
-"""Height over width of a view, until one is known."""
 _OF_THE_HAND = frozenset({Step.CONNECT, Step.SHOW_HAND, Step.MAKE_CURSOR})
 OF_THE_RESULT = frozenset({Step.VERIFY, Step.SAVE})
 """Steps whose picture shows the result."""
@@ -58,20 +64,18 @@ class GuidePicture(QWidget):
         self._legend = outline_legend()
         self.result = ResultBar()
         self.result.hide()
-        self._aspect = 0.0  # height over width of the views, the largest beside one result
-        self._is_before = self._has_only_result = False
+        self._is_before = False
         self._blink = QTimer(self, interval=_BLINK_MS)
         self._blink.timeout.connect(lambda: self._show_before(not self._is_before))
         self.result.blink_toggled.connect(self._set_blinking)
         views = QWidget()
-        self._both = QWidget()
+        both = QWidget()
         columns = ((one, 1) for one in self._columns.values())
         eyes = hbox(*columns, margins=0, spacing=SPACING_PX)
         # From the left, so that no entry moves when another is added.
         legend = hbox(*self._legend.values(), 1, margins=0, spacing=2 * SPACING_PX)
-        # Above: below, it would be far from pictures that are less high than their place.
-        self._rows = vbox(legend, (eyes, 1), on=self._both, margins=0)
-        self._layout = vbox((self._both, 1), self.result, on=views, margins=0, spacing=SPACING_PX)
+        vbox(legend, (eyes, 1), on=both, margins=0, spacing=SPACING_PX // 2)
+        vbox(self.result, (both, 1), on=views, margins=0, spacing=SPACING_PX)
         self._views = views
         self._stack = QStackedLayout(self)
         for page in (self._camera, self._views):
@@ -83,11 +87,6 @@ class GuidePicture(QWidget):
         """True if the picture is of the eyes' views."""
         return self.step not in _OF_THE_HAND
 
-    @property
-    def is_result_beside(self) -> bool:
-        """True if the result is beside the eyes, not below them."""
-        return self._layout.direction() is QBoxLayout.Direction.LeftToRight
-
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the picture of a snapshot that fits the step."""
         verifying = snapshot.procedure.verifying
@@ -95,6 +94,7 @@ class GuidePicture(QWidget):
         # Of a cursor or a verification, only the eyes that it is for.
         is_of_some = self.step is Step.ALIGN or verifying is not None
         open_eyes = snapshot.procedure.eyes if is_of_some else EYES
+        self.result.offer_blinking(is_result and snapshot.comparing is None)
         if self.wants_views and (snapshot.views or is_result):
             self._show_eyes(snapshot, open_eyes, is_result=is_result)
         else:
@@ -105,29 +105,6 @@ class GuidePicture(QWidget):
         self._frame = None
         self._camera.show_image(None)
         self._camera.show_overlay(None)
-
-    def fit(self, *, has_details: bool, has_eyes: bool) -> None:
-        """Leave out of the result what a low window has no room for: the eyes only above it."""
-        self.result.card.show_details(has_details)
-        self._has_only_result = not has_eyes
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Put the result beside the eyes if that makes them larger."""
-        super().resizeEvent(event)
-        self._arrange()
-
-    def _arrange(self) -> None:
-        """Put the result below the eyes, or beside them if they are larger then."""
-        width_px, height_px, card = self.width(), self.height(), self.result
-        aspect = self._aspect or _ASPECT
-        card_px = max(card.sizeHint().height(), card.heightForWidth(width_px))
-        below_px = min(height_px - card_px, aspect * width_px / 2)
-        beside_px = min(height_px, aspect * width_px / 4)
-        is_wide = beside_px > below_px and width_px > 2 * card.minimumSizeHint().width()
-        directions = QBoxLayout.Direction
-        self._layout.setDirection(directions.LeftToRight if is_wide else directions.TopToBottom)
-        self._layout.setStretchFactor(card, 1 if is_wide else 0)
-        self._fit_eyes()
 
     def _show_camera(self, snapshot: Snapshot) -> None:
         self.result.hide()  # or it takes its room in the layout
@@ -163,39 +140,11 @@ class GuidePicture(QWidget):
             entry.show_on_image(has_image)
         has_cursor = any(len(view.cursor_px) for view in snapshot.views.values())
         self._legend["cursor"].setVisible(has_cursor or snapshot.procedure.cursor is not None)
-        part_px = show_alike([self._eyes[eye] for eye in eyes])
-        is_new = is_result and self.result.isHidden()
+        show_alike([self._eyes[eye] for eye in eyes])
         self.result.setVisible(is_result)
-        # Only higher while the result is shown, or the result would move with the hand.
-        before = self._aspect * is_result
-        self._aspect = before if part_px.isEmpty() else max(before, _aspect(part_px))
         if is_result:
             self.result.show_snapshot(snapshot)
-        if is_new:
-            self._arrange()
-        has_eyes = not (is_result and not self.is_result_beside and self._has_only_result)
-        self._both.setVisible(has_eyes)
-        self.result.offer_blinking(has_eyes)
-        self._fit_eyes()
         self._stack.setCurrentWidget(self._views)
-
-    def _fit_eyes(self) -> None:
-        """Make the eyes no higher than their picture, so that the result stands right below."""
-        is_below = not self.is_result_beside and not self.result.isHidden()
-        is_fitted = is_below and self._aspect > 0.0
-        shown = sum(not column.isHidden() for column in self._columns.values())
-        both_px = self.width() / (2 if self.is_result_beside else 1)
-        width_px = (both_px - SPACING_PX * (shown - 1)) / max(shown, 1)
-        title_px = self._titles["left"].sizeHint().height()
-        legend_px = self._legend["hand"].sizeHint().height()
-        fitted_px = title_px + max(round(self._aspect * width_px), _LEAST_PX[1]) + legend_px
-        # A low window has no room to hold the key apart from the titles below it.
-        gap_px = SPACING_PX // 2
-        below_px = self.result.sizeHint().height() + SPACING_PX if is_below else 0
-        is_low = self.height() - below_px < fitted_px + gap_px
-        self._rows.setSpacing(0 if is_low else gap_px)
-        fitted_px += self._rows.spacing()
-        self._both.setMaximumHeight(fitted_px if is_fitted else _ANY_HEIGHT_PX)
 
     def _set_blinking(self, is_blinking: bool) -> None:
         if is_blinking:
@@ -213,6 +162,78 @@ class GuidePicture(QWidget):
             canvas.show_drawn(not is_before)
 
 
-def _aspect(part_px: QRectF) -> float:
-    """Return height over width."""
-    return part_px.height() / part_px.width()
+class ResultBar(QWidget):
+    """The result card; its buttons to blink, copy and print stand elsewhere.
+
+    Attributes
+    ----------
+    buttons : QWidget
+    card : ResultCard
+    blink_toggled : Signal(bool)
+        Before and after should be shown in turn, or no longer.
+    """
+
+    blink_toggled = Signal(bool)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("resultBar")
+        self._results: Results | None = None
+        self._target_arcmin = VerdictSettings().target_arcmin
+        self._record: SessionRecord | None = None
+        self.card = ResultCard()
+        self._blink = add_action(
+            self, tr("Bl&ink before/after"), "", tooltip=tr("Show both in turn")
+        )
+        self._blink.setCheckable(True)
+        self._blink.toggled.connect(self.blink_toggled)
+        copy = add_action(self, tr("Cop&y"), "", self.copy, tooltip=tr("Copy the result as text"))
+        window = Qt.ShortcutContext.WindowShortcut
+        ask = add_action(self, tr("Print the result"), "Ctrl+P", self._ask_printer, context=window)
+        ask.setIconText(tr("Print… (Ctrl+P)"))
+        self._blink_button, *others = map(tool_button, (self._blink, copy, ask))
+        self.buttons = QWidget()
+        hbox(self._blink_button, *others, on=self.buttons, margins=0, spacing=SPACING_PX)
+        vbox(self.card, on=self, margins=0)
+
+    def show_snapshot(self, snapshot: Snapshot) -> None:
+        """Show the results of a snapshot if they have changed."""
+        results, record = snapshot.procedure.results, snapshot.record
+        self._target_arcmin = snapshot.settings.solve.verdict.target_arcmin
+        if results is not self._results or record is not self._record:
+            self._results, self._record = results, record
+            self.card.show_results(results, record, self._target_arcmin)
+
+    def offer_blinking(self, is_offered: bool) -> None:
+        """Offer to show before and after in turn, where they are in sight."""
+        self._blink_button.setVisible(is_offered)
+        if not is_offered:
+            self._blink.setChecked(False)
+
+    def text(self) -> str:
+        """Return the result as text; empty if there is none."""
+        if self._results is None or self._record is None:
+            return ""
+        return result_text(self._results, self._record, self._target_arcmin, _head(self._record))
+
+    def copy(self) -> None:
+        """Copy the result as text."""
+        copy_text(self.buttons, self.text(), tr("Copied: the result"))
+
+    def print_to(self, printer: QPagedPaintDevice) -> None:
+        """Print the result as text."""
+        document = QTextDocument()
+        document.setPlainText(self.text())
+        document.print_(printer)
+
+    def _ask_printer(self) -> None:
+        ask_printer(self.buttons, self.print_to)
+
+
+def _head(record: SessionRecord) -> Mapping[str, str]:
+    return {
+        tr("Wearer"): record.wearer or tr("without a name"),
+        tr("Started"): local_time(record.events[0].time),
+        tr("Rig"): record.rig.name,
+        tr("Session"): record.path.name,
+    } | ({tr("Simulated"): record.simulated} if record.simulated else {})

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from math import ceil
+
 from handcal.core.types import Eye
+from handcal.register.verdict_words import VERDICT_WORDS
 from handcal.session.judged_trials import EyeTrials, eye_trials, is_doubted
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.translation import tr
@@ -47,6 +50,16 @@ def hand_found(snapshot: Snapshot) -> Precondition:
     return Precondition((seen and sentence(seen.problem)) or without, False)
 
 
+def can_match(snapshot: Snapshot) -> Precondition:
+    """Return whether a confirmation would find its image: a hand is found, in enough of them."""
+    needed_hz = ceil(0.5 / snapshot.settings.match_tolerance_s)
+    rate_hz = snapshot.camera.rate_hz
+    if snapshot.camera.problem or rate_hz >= needed_hz:
+        return hand_found(snapshot)
+    text = tr("Images per second: {:.0f} of the {} needed. Close other programs.")
+    return Precondition(text.format(rate_hz, needed_hz), False)
+
+
 def trials_of(snapshot: Snapshot) -> dict[Eye, EyeTrials]:
     """Return the user-test trials of the present results."""
     results = snapshot.procedure.results
@@ -69,7 +82,9 @@ def eyes_accepted(snapshot: Snapshot) -> tuple[Precondition, ...]:
         return ()
     return tuple(
         Precondition(
-            tr("{} eye: {}, {}").format(EYE_WORDS[eye].capitalize(), verdict.name, verdict.reason),
+            tr("{} eye: {}. {}").format(
+                EYE_WORDS[eye].capitalize(), VERDICT_WORDS[verdict.name], verdict.reason
+            ),
             verdict.name == "accept",
             verdict.name,
         )

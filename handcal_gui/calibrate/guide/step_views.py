@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from handcal.calibration.procedure import Procedure
 from handcal.calibration.states import State
 from handcal.calibration.verifying import VerifyingView
-from handcal.core.types import Eye, VerdictName
+from handcal.core.types import Eye, Verdict, VerdictName
 from handcal.register.guard import turn_advice
 from handcal.register.results import USED, Results
+from handcal.register.verdict_words import VERDICT_WORDS
 from handcal.report.cells import signed
+from handcal.session.drawn import drawn_shifts
 from handcal.session.session import SessionRecord
+from handcal.session.trial import SAME_SHIFT_M
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.translation import tr
 from handcal_gui.calibrate.guide.preconditions import (
+    can_match,
     doubted_eyes,
     eyes_accepted,
-    hand_found,
     hand_still,
     is_placed,
 )
@@ -69,9 +71,16 @@ def connect_view(snapshot: Snapshot) -> WizardView:
             has_poses,
         ),
     )
-    is_ready = _all_hold(preconditions)
     if snapshot.contradiction and not camera.problem:
         preconditions = (Precondition(sentence(snapshot.contradiction), False), *preconditions[1:])
+    seen = snapshot.observation
+    is_refused = seen is not None and seen.contradiction is not None
+    is_refused |= bool(snapshot.contradiction) and snapshot.procedure.results is None
+    has_failed = bool(snapshot.contradiction) and is_refused
+    # Evidence against a result that is there does not keep anybody from looking at it.
+    is_ready = not has_failed and all(
+        one.holds for one in preconditions[bool(snapshot.contradiction) :]
+    )
     former = snapshot.record.facts.former
     puts_on, label, fact = tr("Put the headset on the wearer"), tr("Begin"), ""
     if begun := _made(snapshot.record):
@@ -86,6 +95,8 @@ def connect_view(snapshot: Snapshot) -> WizardView:
     text = tr("{} and wait until camera and headset are connected.").format(puts_on)
     if is_ready:
         text = tr("{}, then press {}.").format(puts_on, label)
+    elif has_failed:
+        text = tr("A check has failed. Follow its advice, then press {}.").format(label)
     return WizardView(
         Step.CONNECT,
         text,
@@ -101,7 +112,7 @@ def align_view(snapshot: Snapshot) -> WizardView:
     cursor, was = procedure.cursor, procedure.refused_for
     seen_ns = snapshot.t_host_ns - cursor.t_host_ns if cursor is not None else 0
     preconditions = (
-        hand_found(snapshot),
+        can_match(snapshot),
         _as_cursor(snapshot),
         _looked(tr("Cursor shown for {:g} s"), seen_ns),
     )
@@ -164,11 +175,11 @@ def sending(results: Results) -> tuple[str, str]:
     text = tr("Send the {} eye's projection; the {} eye keeps the offline calibration.")
     if faulty:
         text = tr(
-            "Send the {} eye's projection; the {} eye keeps the offline calibration, because its "
-            "result is {}."
+            "Send the {} eye's projection; the {} eye keeps the offline calibration: its result "
+            "is {}."
         )
     used_word, kept_word = EYE_WORDS[used[0]], EYE_WORDS[kept[0]]
-    text = text.format(used_word, kept_word, results.verdicts[kept[0]].name)
+    text = text.format(used_word, kept_word, VERDICT_WORDS[results.verdicts[kept[0]].name].lower())
     return text, tr("Send {} eye").format(used_word)
 
 
@@ -191,7 +202,7 @@ def verification_view(snapshot: Snapshot, verifying: VerifyingView) -> WizardVie
     total_arcmin = float(np.hypot(moved.right_arcmin, moved.down_arcmin))
     seen_ns = snapshot.t_host_ns - verifying.began_host_ns
     preconditions = (
-        hand_found(snapshot),
+        can_match(snapshot),
         hand_still(snapshot),
         _looked(tr("Outline shown for {:g} s"), seen_ns),
     )
@@ -221,7 +232,9 @@ def verification_view(snapshot: Snapshot, verifying: VerifyingView) -> WizardVie
     )
 
 
-def falsified_view(preconditions: tuple[Precondition, ...]) -> WizardView | None:
+def falsified_view(
+    preconditions: tuple[Precondition, ...], snapshot: Snapshot
+) -> WizardView | None:
     """Return the view of a result against which there is evidence, which no alignment removes."""
     if not any(one.verdict == "contradicted" for one in preconditions):
         return None
@@ -229,16 +242,14 @@ def falsified_view(preconditions: tuple[Precondition, ...]) -> WizardView | None
         Step.VERIFY,
         tr("Do not use this result. Finish, follow the advice below, and calibrate again."),
         preconditions,
-        ButtonSpec(Action.NEXT, tr("Finish")),
+        ButtonSpec(end_action(snapshot), tr("Finish")),
         (ButtonSpec(Action.ANOTHER, tr("&Add alignment")),),
     )
 
 
-def can_end(snapshot: Snapshot) -> bool:
-    """Return whether nothing is left to decide: every eye is settled, and no trial doubts one."""
-    judged = eyes_accepted(snapshot)
-    is_settled = bool(judged) and all(one.verdict in SETTLED for one in judged)
-    return is_settled and not doubted_eyes(snapshot) and not snapshot.problem
+def end_action(snapshot: Snapshot) -> Action:
+    """Return the action that ends the session, by one press unless its data cannot be stored."""
+    return Action.NEXT if snapshot.problem else Action.FINISH
 
 
 def save_view(snapshot: Snapshot) -> WizardView:
@@ -251,27 +262,33 @@ def save_view(snapshot: Snapshot) -> WizardView:
     judged = preconditions[1:]
     doubted = doubted_eyes(snapshot)
     is_settled = bool(judged) and all(one.verdict in SETTLED for one in judged)
-    is_verified = is_settled and len(snapshot.record.verified_now) == len(judged)
+    is_good = bool(judged) and all(one.verdict == "accept" for one in judged)
+    is_verified = is_good and len(snapshot.record.verified_now) == len(judged)
     unearned = frozenset() if is_verified else frozenset({Step.VERIFY})
     if snapshot.record.is_finished:
         text = tr(
             "The session is complete. Take the headset off, or continue with the next wearer."
         )
+        if kept := [eye for eye in kept_eyes(snapshot) if is_settled]:
+            text = tr(
+                "The session is complete; the result is not used for {}. Take the headset off, or "
+                "continue with the next wearer."
+            ).format(eye_names(kept))
         if judged and not is_settled:
             text = tr(
-                "The session is finished, its result not accepted: go back to measure more, or "
-                "continue with the next wearer."
+                "The session is finished, but its result is not good yet. Go back to measure more, "
+                "or continue with the next wearer."
             )
         elif doubted:
             text = tr(
-                "The session is finished, but trials of {} are over the target: go back to measure "
+                "The session is finished, but trials of {} are over the target. Go back to measure "
                 "again, or continue with the next wearer."
             ).format(eye_names(doubted))
         main = ButtonSpec(Action.NEXT_WEARER, tr("Next wearer"))
     else:
         text = tr("Everything is already saved. Finish the session when you are done.")
         if judged and not is_settled:
-            text = tr("Not accepted. Go back to measure more, or finish as it is; all is saved.")
+            text = tr("Not good yet. Go back to measure more, or finish as it is; all is saved.")
         elif doubted:
             text = tr(
                 "Trials of {} are over the target. Go back to measure again, or finish as it is; "
@@ -285,8 +302,8 @@ def save_view(snapshot: Snapshot) -> WizardView:
         text,
         preconditions,
         main,
-        others,
-        fact=kept_fact(snapshot.procedure),
+        (*others, *keep_choices(snapshot)),
+        fact=drawn_fact(snapshot),
         unearned=unearned,
     )
 
@@ -298,17 +315,48 @@ def doubt_sentence(snapshot: Snapshot) -> str:
     return text.format(eye_names(doubted)) if doubted else ""
 
 
-def kept_fact(procedure: Procedure) -> str:
-    """Return which eyes have the offline calibration by their verdicts; empty if none."""
-    results = procedure.results
+def drawn_fact(snapshot: Snapshot) -> str:
+    """Return why the headset does not draw the final φ now, or how to go on; empty if it does."""
+    procedure, results = snapshot.procedure, snapshot.procedure.results
     if results is None or procedure.state is not State.APPLIED:
         return ""
-    kept = _kept(results)
-    if not kept:
-        return ""
-    return tr("The headset uses the offline calibration for {}: φ is 0 there.").format(
-        eye_names(kept)
-    )
+    final, drawn_m = drawn_shifts(snapshot.record, results), procedure.applied_shift_m
+    others: list[Eye] = [
+        eye
+        for eye in results.eyes
+        if np.abs(drawn_m[eye] - final[eye].shift_m).max() >= SAME_SHIFT_M
+    ]
+    if others:
+        text = tr("The headset draws {} with another φ for the moment: {}.")
+        moved = tr("it is moved for a trial") if snapshot.trial_eye else tr("it is being set")
+        return text.format(eye_names(others), moved)
+    former_m, solved_m = procedure.former_shift_m, results.rendered_shift_m
+    is_back = any((drawn_m[eye] != solved_m[eye]).any() for eye in solved_m)
+    can_return = all(eye in former_m and (former_m[eye] == solved_m[eye]).all() for eye in solved_m)
+    return tr("Press G to return to the newest φ.") if is_back and can_return else ""
+
+
+def keep_choices(snapshot: Snapshot) -> tuple[ButtonSpec, ...]:
+    """Return the button that uses results that are no better than before, or drops them again."""
+    results = snapshot.procedure.results
+    kept = kept_eyes(snapshot)
+    if results is None or not kept or snapshot.procedure.state is not State.APPLIED:
+        return ()
+    final = drawn_shifts(snapshot.record, results)
+    if all(final[eye].kind == "solved" for eye in kept):
+        return (ButtonSpec(Action.KEEP_OFFLINE, tr("Keep &offline")),)
+    return (ButtonSpec(Action.USE_ANYWAY, tr("&Use it anyway")),)
+
+
+def kept_eyes(snapshot: Snapshot) -> list[Eye]:
+    """Return the usable eyes whose result is no better than the offline calibration."""
+    results = snapshot.procedure.results
+    verdicts = results.verdicts if results is not None else {}
+    return [eye for eye in snapshot.plan.usable_eyes if _name(verdicts, eye) == "keep"]
+
+
+def _name(verdicts: Mapping[Eye, Verdict], eye: Eye) -> str:
+    return verdicts[eye].name if eye in verdicts else ""
 
 
 def _kept(results: Results) -> tuple[Eye, ...]:

@@ -29,19 +29,22 @@ from handcal_gui.calibrate.guide.step_views import (
     UNUSABLE,
     VERIFY_AGAIN,
     align_view,
-    can_end,
     connect_view,
     distance,
     doubt_sentence,
+    drawn_fact,
+    end_action,
     eye_names,
     falsified_view,
-    kept_fact,
+    keep_choices,
+    kept_eyes,
     save_view,
     sending,
     verification_view,
 )
 from handcal_gui.calibrate.guide.view import (
     EYE_WORDS,
+    MOST_OTHERS,
     Action,
     ButtonSpec,
     Precondition,
@@ -117,6 +120,12 @@ class Wizard:
         self._latest = Step.VERIFY if is_of_verification else step or self._latest
         return self._latest
 
+    def needs_frames(self, snapshot: Snapshot) -> bool:
+        """Return whether the present step needs the camera's images."""
+        planned = snapshot.next_step
+        is_over = planned is not None and planned.name is StepName.DONE
+        return self._page is None and not is_over
+
     def move(self, action: Action) -> None:
         """Turn to another page: *Connect* and *Save* lie before and after the plan.
 
@@ -146,7 +155,6 @@ class Wizard:
             return connect_view(snapshot)
         if step is Step.SAVE:
             view = save_view(snapshot)
-            view = replace(view, fact=_drawn_otherwise(snapshot) or view.fact)
             slipped = ButtonSpec(Action.SLIPPED, tr("Headset &slipped"))
             if not snapshot.record.is_finished:
                 return view
@@ -173,8 +181,7 @@ class Wizard:
             case StepName.RAISE if planned.awaited is StepName.VERIFY:
                 return self._ask_to_verify(planned, snapshot)
             case StepName.DONE:
-                fact = _drawn_otherwise(snapshot) or kept_fact(procedure)
-                return replace(_done_view(planned, snapshot), fact=fact)
+                return replace(_done_view(planned, snapshot), fact=drawn_fact(snapshot))
         return _raise_view(planned, snapshot)
 
     def _cursor(self, planned: NextStep, snapshot: Snapshot) -> WizardView:
@@ -263,7 +270,7 @@ def _ways_out(planned: NextStep, snapshot: Snapshot) -> tuple[ButtonSpec, ...]:
         return (_BACK,)
     is_one = len(results.eyes) < len(snapshot.plan.usable_eyes)
     end = tr("Fini&sh with one eye") if is_one else tr("Finish a&s it is")
-    return (ButtonSpec(Action.NEXT, end), _BACK)
+    return (ButtonSpec(end_action(snapshot), end), _BACK)
 
 
 def _raise_view(planned: NextStep, snapshot: Snapshot) -> WizardView:
@@ -307,7 +314,8 @@ def _done_view(planned: NextStep, snapshot: Snapshot) -> WizardView:
         view = _not_accepted_view(preconditions, snapshot)
         return view if preconditions else replace(view, sentence=f"{sentence(planned.text)}.")
     text = tr("Not every eye has been verified. Finish as it is, or verify an eye.")
-    main = ButtonSpec(Action.NEXT, tr("Finish as it is"))
+    end = end_action(snapshot)
+    main = ButtonSpec(end, tr("Finish as it is"))
     if set(record.facts.verified) >= set(usable):
         text = tr("Verified before the alignments changed. Finish, or verify an eye again.")
         if record.verified_now:
@@ -326,9 +334,9 @@ def _done_view(planned: NextStep, snapshot: Snapshot) -> WizardView:
                 text = tr(
                     "Verified; the result is not used for every eye. Finish, or measure more."
                 )
-        main = ButtonSpec(Action.FINISH if can_end(snapshot) else Action.NEXT, tr("Finish"))
+        main = ButtonSpec(end, tr("Finish"))
     if doubt := doubt_sentence(snapshot):
-        text, main = doubt, ButtonSpec(Action.NEXT, tr("Finish as it is"))
+        text, main = doubt, ButtonSpec(end, tr("Finish as it is"))
     return WizardView(Step.VERIFY, text, preconditions, main, _more(snapshot))
 
 
@@ -337,6 +345,8 @@ def _more(snapshot: Snapshot) -> tuple[ButtonSpec, ...]:
     usable = snapshot.plan.usable_eyes
     add = ButtonSpec(Action.ANOTHER, tr("&Add alignment"))
     unverified = [eye for eye in usable if eye not in snapshot.record.verified_now]
+    if kept := keep_choices(snapshot):
+        return (*kept, *(VERIFY_AGAIN[eye] for eye in kept_eyes(snapshot)), add)
     if _keeps_hand(snapshot) or len(usable) == 1:
         return (add, *(VERIFY_AGAIN[eye] for eye in usable))
     return (add, *(VERIFY_AGAIN[eye] for eye in unverified)) if unverified else (add, *_REPEAT)
@@ -344,10 +354,10 @@ def _more(snapshot: Snapshot) -> tuple[ButtonSpec, ...]:
 
 def _not_accepted_view(preconditions: tuple[Precondition, ...], snapshot: Snapshot) -> WizardView:
     """Return the view of a plan that has ended without an accepted result."""
-    if falsified := falsified_view(preconditions):
+    if falsified := falsified_view(preconditions, snapshot):
         return falsified
     can_do, usable = is_steady(snapshot), snapshot.plan.usable_eyes
-    text = tr("Not accepted yet. Add an alignment, or finish as it is.")
+    text = tr("Not good yet. Add an alignment, or finish as it is.")
     main = ButtonSpec(Action.ANOTHER, tr("Add alignment"))
     others = [one for one in _more(snapshot) if one.action is not Action.ANOTHER]
     again: list[Eye] = []
@@ -357,9 +367,9 @@ def _not_accepted_view(preconditions: tuple[Precondition, ...], snapshot: Snapsh
     if any(one.verdict in UNUSABLE for one in preconditions):
         text = tr("Do not use this result. Follow the advice below, then add alignments.")
     elif again and all(eye in snapshot.record.facts.verified for eye in usable):
-        text = tr(
-            "Not accepted yet: verify {} again. Another alignment would change little."
-        ).format(eye_names(sorted(again)))
+        text = tr("Not good yet: verify {} again. Another alignment would change little.").format(
+            eye_names(sorted(again))
+        )
         first = VERIFY_AGAIN[again[0]]
         others = [VERIFY_AGAIN[eye] for eye in usable if eye != again[0]]
         others.insert(0, ButtonSpec(Action.ANOTHER, tr("&Add alignment")))
@@ -370,29 +380,5 @@ def _not_accepted_view(preconditions: tuple[Precondition, ...], snapshot: Snapsh
         text,
         (hand_found(snapshot), hand_still(snapshot), *preconditions),
         main,
-        (*others, ButtonSpec(Action.NEXT, tr("Finish a&s it is"))),
+        (*others[: MOST_OTHERS - 1], ButtonSpec(end_action(snapshot), tr("Finish a&s it is"))),
     )
-
-
-def _drawn_otherwise(snapshot: Snapshot) -> str:
-    """Return a note if the headset draws with a φ other than that of the result; else empty."""
-    procedure = snapshot.procedure
-    results, drawn_m = procedure.results, procedure.applied_shift_m
-    if results is None or procedure.state is not State.APPLIED:
-        return ""
-    solved_m = results.rendered_shift_m
-    others = [eye for eye in solved_m if (drawn_m[eye] != solved_m[eye]).any()]
-    if not others:
-        return ""
-    which = tr("a fine-tuned φ")
-    if snapshot.record.went_back:
-        is_offline = not any(drawn_m[eye].any() for eye in solved_m)
-        which = tr("the offline calibration's φ") if is_offline else tr("an earlier φ")
-    former_m = procedure.former_shift_m
-    can_return = all(eye in former_m and (former_m[eye] == solved_m[eye]).all() for eye in solved_m)
-    how = tr("Press G to return.") if can_return else tr("Reset φ in Fine-tune to return.")
-    eyes = tr("Both eyes")
-    if len(others) == 1:
-        eyes = tr("{} eye").format(EYE_WORDS[others[0]].capitalize())
-    found = tr("{}: drawn, saved and exported with {}; the verdict applies to the solved φ.")
-    return f"{found.format(eyes, which)} {how}"

@@ -58,6 +58,8 @@ class Action(StrEnum):
     SKIP = "skip the verification"
     VERIFY_LEFT = "verify the left eye"
     VERIFY_RIGHT = "verify the right eye"
+    USE_ANYWAY = "use the result anyway"
+    KEEP_OFFLINE = "keep the offline calibration"
     SLIPPED = "begin again after the headset slipped"
     FINISH = "finish"
     NEXT_WEARER = "next wearer"
@@ -77,10 +79,14 @@ ACTION_NAMES: dict[str, str] = {
     Action.SKIP: tr("skip the verification"),
     Action.VERIFY_LEFT: tr("verify the left eye"),
     Action.VERIFY_RIGHT: tr("verify the right eye"),
+    Action.USE_ANYWAY: tr("use the result anyway"),
+    Action.KEEP_OFFLINE: tr("keep the offline calibration"),
     Action.FINISH: tr("finish"),
 }
 """The engine's commands in the user's language, within "Could not …"."""
 
+MOST_OTHERS = 4
+"""Largest number of buttons beside the main one."""
 WEARERS = Action.CONFIRM, Action.VERIFIED
 """Actions that are left to the wearer, in the headset."""
 

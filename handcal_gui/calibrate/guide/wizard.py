@@ -2,30 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import zip_longest
 
-from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
-from PySide6.QtGui import QAction, QResizeEvent, QShortcut
-from PySide6.QtWidgets import QComboBox, QLabel, QWidget
+from PySide6.QtCore import QRectF, QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QAction, QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QShortcut
+from PySide6.QtWidgets import QApplication, QComboBox, QHBoxLayout, QLabel, QSizePolicy, QWidget
 
 from handcal.calibration.plan import PlanSettings
 from handcal.calibration.states import State
 from handcal.core.types import EyePlan
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.keys import add_action
-from handcal_gui.app.theme import SPACING_PX, colors, follow_theme, font_px, scale_font
+from handcal_gui.app.theme import SPACING_PX, colors, follow_theme, icon, scale_font
 from handcal_gui.app.translation import tr
 from handcal_gui.calibrate.guide.action_bar import ActionBar
 from handcal_gui.calibrate.guide.picture import OF_THE_RESULT, GuidePicture
-from handcal_gui.calibrate.guide.progress_ring import ProgressRing
-from handcal_gui.calibrate.guide.rows import PreconditionRows, StepRail
 from handcal_gui.calibrate.guide.steps import Wizard
-from handcal_gui.calibrate.guide.view import WEARERS, Action, Step, WizardView
+from handcal_gui.calibrate.guide.view import (
+    STEPS,
+    WEARERS,
+    Action,
+    Precondition,
+    Step,
+    WizardView,
+)
 from handcal_gui.calibrate.trials.comparison_row import ComparisonRow
 from handcal_gui.widgets.brief import show_briefly
 from handcal_gui.widgets.fields import tool_button
-from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
+from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.result_rows import VERDICT_COLORS, VERDICT_ICONS
 from handcal_gui.widgets.sentence import sentence
 
 _ORDERS: dict[EyePlan, str] = {
@@ -41,19 +49,12 @@ _COMPARING = {
     True: tr("The wearer compares two drawings. Record the answer here, or stop comparing."),
 }
 """Beside the panels, and in the station, which shows no trials."""
-_NO_TRIALS = tr("Trials are recorded once φ is solved, beside the panels: press F11, then T")
-_RING_PX = 9 * SPACING_PX, 10 * SPACING_PX, 16 * SPACING_PX
-_SENTENCE_SCALE, _ROW_SCALE = (1.2, 1.5, 2.0), (1.0, 1.1, 1.3)
-"""Size of the ring and scales of texts: beside panels, without them in a small window, and in a
-large one."""
-_LARGE_PX, _LARGE_SCALE = (1400, 1100), 1.5
-"""Width and height from which the guide has larger texts, and their scale."""
-_LOW_WINDOW = 45.5
-"""Height of the window, in sizes of the font, below which the guide has smaller gaps, and its
-preconditions are side by side; no message may move its buttons."""
-_DETAILED, _SEEN = {False: 42.0, True: 33.5}, 29.5
-"""Heights of the room for the guide, without its messages, from which its result has details, below
-the views of the eyes and beside them, and from which it has these views; in sizes of the font."""
+_NO_TRIALS = tr("Trials are recorded once φ is solved, beside the panels: press F11, then T.")
+_RING_PX = 9 * SPACING_PX, 16 * SPACING_PX
+_SENTENCE_SCALE, _ROW_SCALE = (1.2, 1.8), (1.0, 1.2)
+"""Size of the ring and scales of texts: beside panels, and in the whole window."""
+_RING_STEPS = 60
+"""The ring is painted again only if it has grown by one of so many parts."""
 _ARCMIN, _FAR_ARCMIN, _GROWTH = 1.0, 5.0, 0.002
 _NUDGES: dict[tuple[str, str], tuple[float, float, float]] = {
     (tr("Move the outline left"), "Left"): (-_ARCMIN, 0.0, 0.0),
@@ -119,8 +120,7 @@ class WizardPanel(QWidget):
         self.picture = GuidePicture()
         self.comparison = ComparisonRow()
         self.comparison.hide()
-        self._is_station = self._is_large = False
-        self._room = 0
+        self._is_station = False
         self._ring = ProgressRing("wizardRing")
         self._hold = self._hold_action()
         self._no_trials = QShortcut("T", self, lambda: show_briefly(self, _NO_TRIALS))
@@ -145,7 +145,6 @@ class WizardPanel(QWidget):
         self._plan = QComboBox()
         self._plan.setObjectName("wizardPlan")
         self._lay_out()
-        self._fit_soon = fit_soon(self._fit, self)
         self.bar.asked.connect(self.asked)
         self._plan.currentIndexChanged.connect(
             lambda index: self.eyes_chosen.emit(list(_ORDERS)[index])
@@ -167,7 +166,7 @@ class WizardPanel(QWidget):
             said = _COMPARING[self._is_station]
             view = replace(view, sentence=said, main=main, others=(), note="", fact="")
         self.comparison.show_comparison(
-            snapshot.comparing, has_seen_both=snapshot.has_compared_both, can_begin=False, count=0
+            snapshot.comparing, has_seen_both=snapshot.has_compared_both, can_begin=False
         )
         self.comparison.setVisible(self._is_station and snapshot.comparing is not None)
         self.picture.step = view.step
@@ -187,54 +186,23 @@ class WizardPanel(QWidget):
         self._hold.setChecked(is_held)
         self._refresh()
 
-    def fill_window(self, is_station: bool, *, is_small: bool) -> None:
-        """Use the room of a window without panels, or less, and do without the panels."""
+    def use_whole_window(self, is_station: bool) -> None:
+        """Use the room of a window without panels, and do without the panels."""
         self._is_station = is_station
         self._no_trials.setEnabled(is_station)
-        self._room = (1 if is_small else 2) if is_station else 0
-        self._scale_texts()
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Enlarge the texts of a guide that is so large that it is read from afar."""
-        super().resizeEvent(event)
-        least = QSize(*_LARGE_PX)
-        is_large = self.size().expandedTo(least) == self.size()
-        if is_large != self._is_large:
-            self._is_large = is_large
-            self._scale_texts()
-        self._fit_soon.start()
-
-    def _fit(self) -> None:
-        """Leave out what a low window has no room for, or one with messages."""
-        said = (one for one in (self._fact, self._note) if not one.isHidden())
-        said_px = sum(one.heightForWidth(self._sentence.width()) for one in said)
-        height = ((self.parentWidget() or self).height() - said_px) / font_px()
-        has_details = height >= _DETAILED[self.picture.is_result_beside]
-        is_low = self.window().height() / font_px() < _LOW_WINDOW
-        self.picture.fit(has_details=has_details, has_eyes=height >= _SEEN)
-        gap_px = SPACING_PX // 2 if is_low else SPACING_PX
-        if (layout := self.layout()) is not None:
-            layout.setContentsMargins(*3 * (2 * gap_px,), gap_px if is_low else 2 * gap_px)
-            layout.setSpacing(gap_px)
-        self._rail.set_gap(gap_px // 2)
-        self._preconditions.fit(is_low=is_low)
-
-    def _scale_texts(self) -> None:
-        larger = _LARGE_SCALE if self._is_large else 1.0
-        for texts, scale in (
-            ([self._sentence], _SENTENCE_SCALE[self._room]),
-            (
-                [self._preconditions, self._fact, self._note, self.comparison],
-                _ROW_SCALE[self._room],
-            ),
-            ([self.picture.result], 1.0),
+        for texts, scales in (
+            ([self._sentence], _SENTENCE_SCALE),
+            ([self._preconditions, self._fact, self._note, self.comparison], _ROW_SCALE),
         ):
             font = self.font()
-            font.setPointSizeF(larger * scale * font.pointSizeF())
+            font.setPointSizeF(scales[is_station] * font.pointSizeF())
             for text in texts:
                 text.setFont(font)
-        self._sentence.setMinimumHeight(2 * self._sentence.fontMetrics().lineSpacing() + 2)
-        self._ring.set_diameter(round(larger * _RING_PX[self._room]))
+        self._ring.setFixedSize(_RING_PX[is_station], _RING_PX[is_station])
+
+    def add_switch(self, station: QAction) -> None:
+        """Offer to show only the guide, beside what holds the steps."""
+        self._head.addWidget(tool_button(station))
 
     def press_main(self) -> None:
         """Press the main button."""
@@ -285,7 +253,6 @@ class WizardPanel(QWidget):
     def _lay_out(self) -> None:
         scale_font(self._title, 1.6, is_bold=True)
         self._sentence.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self._scale_texts()
         self._note.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._plan.addItems(list(_ORDERS.values()))
         self._plan.setMinimumWidth(12 * SPACING_PX)  # narrower than its longest text
@@ -303,9 +270,9 @@ class WizardPanel(QWidget):
         hold = tool_button(self._hold)
         self._choice = QWidget()
         hbox(plan_label, self._plan, on=self._choice, margins=0, spacing=SPACING_PX)
-        head = hbox(self._title, 0, self._choice, self.picture.result.buttons, hold)
+        self._head = hbox(self._title, 0, self._choice, self.picture.result.buttons, hold)
         layout = vbox(self._rail, on=self, margins=2 * SPACING_PX, spacing=SPACING_PX)
-        layout.addLayout(head)
+        layout.addLayout(self._head)
         self._ring.setToolTip(tr("Alignments made, or eyes verified"))
         said = self._sentence, self._preconditions, self._fact, self._note
         texts = vbox(*said, 0, spacing=SPACING_PX // 2)
@@ -313,6 +280,7 @@ class WizardPanel(QWidget):
         layout.addLayout(hbox((texts, 1), ring, spacing=2 * SPACING_PX))
         layout.addWidget(self.comparison)
         layout.addWidget(self.picture, 1)
+        self.use_whole_window(False)
 
     def _refresh(self) -> None:
         view = self.shown
@@ -333,7 +301,6 @@ class WizardPanel(QWidget):
         self._fact.setText(view.fact)
         self._fact.setVisible(bool(view.fact))
         self._note.setVisible(bool(view.note))
-        self._fit_soon.start()
         for action in self._nudges:
             action.setEnabled(view.main.action is Action.VERIFIED)
         self._undo.setEnabled(
@@ -369,11 +336,147 @@ def _count(snapshot: Snapshot, view: WizardView) -> tuple[int, int, str]:
     """Return the alignments made and planned, or the eyes verified, and their name."""
     procedure, record, plan = snapshot.procedure, snapshot.record, snapshot.plan
     if view.omitted or view.step in OF_THE_RESULT:
-        again = {procedure.verifying.eye} if procedure.verifying is not None else set()
-        return len(record.verified_now - again), len(plan.usable_eyes), tr("verified")
+        verified = set(record.facts.verified) & set(plan.usable_eyes)
+        return len(verified), len(plan.usable_eyes), tr("verified")
     done = len(record.alignments)
     is_in_turn = plan.name == "recommended" or plan.in_turn
     planned = len(plan.usable_eyes) if is_in_turn else 1
     if plan.name == "paper":
         planned *= plan.alignments
     return done, max(planned, done + (procedure.state is State.ALIGN)), tr("aligned")
+
+
+class StepRail(QWidget):
+    """The steps in a row, the current one emphasised."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(SPACING_PX // 2)
+        self._labels = {step: QLabel(alignment=Qt.AlignmentFlag.AlignCenter) for step in STEPS}
+        for label in self._labels.values():
+            scale_font(label, 0.85)
+            label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+            layout.addWidget(label)
+
+    def show_step(self, view: WizardView) -> None:
+        """Emphasise the step of a view, and mark those before it."""
+        present = view.step
+        place = STEPS.index(present)
+        for i, (step, label) in enumerate(self._labels.items()):
+            is_over = view.main.action is Action.NEXT_WEARER
+            is_done = (i < place or is_over) and step not in view.omitted
+            is_done &= view.is_aligned or step is not Step.ALIGN
+            mark, color = ("✓ ", colors().good) if is_done else ("", colors().muted)
+            if step in view.unearned:
+                mark, color = "– ", colors().warning
+            label.setText(f"{mark}{step.label}")
+            if step is present:
+                label.setText(f"{'✓' if is_over else '▸'} {step.label}")
+                # A change of the theme reaches this widget's own palette only later.
+                color = QApplication.palette().windowText().color().name()
+            weight = "bold" if step is present else "normal"
+            label.setStyleSheet(f"color: {color}; font-weight: {weight}")
+
+
+class PreconditionRows(QWidget):
+    """Preconditions, one below the other.
+
+    Parameters
+    ----------
+    most : int
+        Largest number of preconditions.
+    """
+
+    def __init__(self, most: int) -> None:
+        super().__init__()
+        self._rows = [_Row() for _ in range(most)]
+        vbox(*self._rows, on=self, margins=0, spacing=SPACING_PX // 2)
+
+    def show_preconditions(self, preconditions: Sequence[Precondition]) -> None:
+        """Replace the preconditions."""
+        for row, shown in zip_longest(self._rows, preconditions):
+            row.show_precondition(shown)
+        self.setVisible(bool(preconditions))
+
+
+class _Row(QWidget):
+    """One precondition: an icon, and a text."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._icon = QLabel()
+        self._text = QLabel(wordWrap=True, textFormat=Qt.TextFormat.PlainText)
+        hbox(self._icon, (self._text, 1), on=self, margins=0, spacing=SPACING_PX)
+
+    def show_precondition(self, shown: Precondition | None) -> None:
+        """Show a precondition, with the icon of its verdict if it has one; None hides the row."""
+        self.setVisible(shown is not None)
+        if shown is None:
+            return
+        name, word = ("check", tr("Yes")) if shown.holds else ("wait", tr("Not yet"))
+        shade = colors().good if shown.holds else colors().muted
+        if shown.verdict is not None:
+            name, word = VERDICT_ICONS[shown.verdict], shown.verdict.capitalize()
+            shade = getattr(colors(), VERDICT_COLORS[shown.verdict])
+        self._icon.setPixmap(icon(name, shade).pixmap(2 * SPACING_PX))
+        self._icon.setAccessibleName(word)
+        self._text.setText(shown.text)
+
+
+class ProgressRing(QWidget):
+    """Shows a count with its name, and fills with it."""
+
+    def __init__(self, name: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName(name)
+        self.setAccessibleName(tr("Progress"))
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self._text = self._unit = ""
+        self._part = 0
+
+    @property
+    def text(self) -> str:
+        """The upper text inside."""
+        return self._text
+
+    def show_count(self, done: int, planned: int, unit: str) -> None:
+        """Show a count."""
+        text = f"{done}/{planned}"
+        part = round(_RING_STEPS * done / planned)
+        shown = part, text, unit
+        if shown != (self._part, self._text, self._unit):
+            self._part, self._text, self._unit = shown
+            self.setAccessibleDescription(f"{text} {unit}")
+            self.update()
+
+    def paintEvent(self, _: QPaintEvent) -> None:
+        """Draw the ring, what has filled of it from the top, and the text."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        width = self.width() / 11
+        ring = QRectF(self.rect()).adjusted(width, width, -width, -width)
+        faint = QColor(colors().muted)
+        faint.setAlphaF(0.3)
+        painter.setPen(QPen(faint, width))
+        painter.drawEllipse(ring)
+        pen = QPen(QColor(colors().good), width)
+        pen.setCapStyle(Qt.PenCapStyle.FlatCap)
+        painter.setPen(pen)
+        painter.drawArc(ring, 90 * 16, -round(360 * 16 * self._part / _RING_STEPS))
+        painter.setPen(self.palette().windowText().color())
+        upper = ring.adjusted(0, 0, 0, -ring.height() / 4 if self._unit else 0)
+        self._write(painter, upper, self._text, self.width() // 4)
+        lower = ring.adjusted(1.8 * width, ring.height() / 2.1, -1.8 * width, -ring.height() / 6)
+        self._write(painter, lower, self._unit, self.width() // 6)
+
+    def _write(self, painter: QPainter, place: QRectF, text: str, height_px: int) -> None:
+        """Write a text in the middle of a place, smaller if it would not fit."""
+        font = self.font()
+        font.setPixelSize(height_px)
+        width_px = QFontMetricsF(font).horizontalAdvance(text)
+        if width_px > place.width():
+            font.setPixelSize(int(height_px * place.width() / width_px))
+        painter.setFont(font)
+        painter.drawText(place, Qt.AlignmentFlag.AlignCenter, text)

@@ -5,16 +5,14 @@ from __future__ import annotations
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QTabWidget, QToolButton, QWidget
 
-from handcal_gui.calibrate.parts.tab_bar import TabBar
-from handcal_gui.widgets.record_table import RecordTable
+from handcal_gui.widgets.table import Table
 
 
 class RecordTabs(QTabWidget):
-    """Tabs with a Delete button in the corner while a `RecordTable` is visible."""
+    """Tabs with a Delete button in the corner while a table that offers to delete is visible."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setTabBar(TabBar())
         self._delete = QToolButton()
         self._delete.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the table handles Del
         self.setCornerWidget(self._delete)
@@ -24,8 +22,9 @@ class RecordTabs(QTabWidget):
 
     def _refresh(self) -> None:
         page = self.currentWidget()
-        if isinstance(page, RecordTable):
+        action = page.delete_action if isinstance(page, Table) else None
+        if action is not None:
             for former in self._delete.actions():  # else both are a menu, with an arrow
                 self._delete.removeAction(former)
-            self._delete.setDefaultAction(page.delete_action)
-        self._delete.setVisible(isinstance(page, RecordTable))
+            self._delete.setDefaultAction(action)
+        self._delete.setVisible(action is not None)

@@ -1,41 +1,54 @@
-"""The results panel: eye shifts, their uncertainty, and the benefit of another alignment."""
+"""The results panel: verdicts, numbers, plots, residuals, and a comparison with another method."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
+from typing import Literal
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QComboBox, QLabel, QStackedLayout, QStackedWidget, QTabWidget, QWidget
+import numpy as np
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QComboBox,
+    QLabel,
+    QProgressBar,
+    QPushButton,
+    QStackedLayout,
+    QStackedWidget,
+    QTabWidget,
+    QWidget,
+)
 
-from handcal.core.types import EYES, Alignment, Eye
-from handcal.register.results import Results
-from handcal.session.judged_trials import EyeTrials, eye_trials
+from handcal.calibration.solve_again import solve_again
+from handcal.core.progress import Progress
+from handcal.core.types import EYES, METHODS, EyeShift, Method
+from handcal.register.benefit import DISTANCES_M
+from handcal.register.results import Results, SolveSettings
+from handcal.session.judged_trials import eye_trials
 from handcal.session.record import SessionRecord
-from handcal.session.trial import Trial
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.keys import add_action
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
-from handcal_gui.calibrate.parts.tab_bar import TabBar
-from handcal_gui.calibrate.results.compare_tab import CompareTab
-from handcal_gui.calibrate.results.convergence_plot import ConvergencePlot
-from handcal_gui.calibrate.results.distance_tab import DistanceTab
-from handcal_gui.calibrate.results.residuals_tab import ResidualsTab
-from handcal_gui.calibrate.results.verdict_card import VerdictCard
+from handcal_gui.calibrate.parts.result_card import ResultCard
+from handcal_gui.calibrate.results.residuals import ResidualsTab
+from handcal_gui.engine.jobs import Job
 from handcal_gui.widgets.brief import copy_text
-from handcal_gui.widgets.fields import paragraph
-from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
-from handcal_gui.widgets.number_table import NumberTable, rows_as_text
+from handcal_gui.widgets.fields import paragraph, with_name
+from handcal_gui.widgets.job_bar import show_share
+from handcal_gui.widgets.layouts import hbox, keep_space, vbox
+from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.result_rows import (
     EYE_NAMES,
     PHI,
     another_text,
+    comparison_rows,
     result_rows,
     single_alignment_rows,
     trial_row,
     verdict_rows,
 )
+from handcal_gui.widgets.table import Row, Table, rows_as_text
 
 _EMPTY = tr(
     "Nothing is solved yet.\n\nEach eye's position, its uncertainty and the verdict appear here "
@@ -45,151 +58,121 @@ _ALONE = tr(
     "±: of measuring the hand in this alignment alone. That of the result also counts how well "
     "the wearer aligns."
 )
-_MARGINS_PX = 3 * SPACING_PX // 2
-"""Of the tab of the eyes: above the cards, between them and the numbers, and below."""
+_DISTANCES = tr(
+    "Expected error in arcminutes; bars and brackets hold 95 %. Dashed: without the calibration. "
+    "Only the eye's place is uncertain here: an error of the rig itself comes on top, and matters "
+    "most far away."
+)
+_TO_POINTS, _TO_SURFACE = tr("Point RMS (mm)"), tr("Surface RMS (mm)")
+_MEANINGS = {
+    _TO_POINTS: tr(
+        "Distance from the hand's points to their partners on the cursor at each iteration\n"
+        "of each alignment, root mean square."
+    ),
+    _TO_SURFACE: tr(
+        "Distance from the hand's points to the cursor's surface, along its normals, at each\n"
+        "iteration of each alignment, root mean square. It is less than the Point RMS\n"
+        "among the numbers of each eye, which is to single points of the cursor."
+    ),
+}
+_SYMBOLS = {"left": "o", "right": "s"}
+_MAX_SYMBOLS = 60
+_MOST_FOR_NAMES = 0.6
+"""Of the width."""
+_TEXT_HEIGHT = 0.08
+"""Of a name, as a share of the plot's height."""
+_BESIDE = {"left": -0.01, "right": 0.01}
+"""Distance of an eye's bars from their place, so that the eyes' do not hide each other."""
+_METHODS: Mapping[Method, str] = {
+    "paper": tr("as published by Hu et al. 2021; slow."),
+    "linear": tr("the paper's model, solved with all three rows of each pair."),
+    "consistent": tr("exact model; robust to cut edges and a rotated hand; the default."),
+    "icp": tr("rigid registration, the paper's baseline."),
+    "icp-open3d": tr("the same by Open3D, which must be installed."),
+}
 
 
 class ResultsPanel(QWidget):
-    """Shows results in tabs: eyes, plots, residuals, alignments, comparison.
+    """Shows results in tabs: eyes, plots, residuals, alignments, another method.
 
     Attributes
     ----------
-    compare_requested : Signal(str)
-        The method to solve the same alignments with; answered by `show_comparison` or
-        `comparison_failed`.
-    compare_cancelled : Signal()
-        The answer is no longer needed.
+    comparison : _CompareTab
     """
-
-    compare_requested = Signal(str)
-    compare_cancelled = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("results-panel")
         self.setAccessibleName(tr("Results"))
         self._results: Results | None = None
-        self._trials: Mapping[int, Trial] = {}
-        self._judged: Mapping[Eye, EyeTrials] = {}
-        self._cards = {eye: VerdictCard(eye) for eye in EYES}
-        self._numbers = NumberTable("numbers-of-both-eyes", tr("Numbers of both eyes"))
-        self._convergence = ConvergencePlot()
+        self._record: SessionRecord | None = None
+        self._target_arcmin = 0.0
+        self._card = ResultCard()
+        self._numbers = Table("numbers-of-both-eyes", tr("Numbers of both eyes"))
+        self._convergence = _ConvergencePlot()
         self._residuals = ResidualsTab()
-        self._alignments = NumberTable(
-            "each-alignment-alone", tr("Each alignment alone"), wraps=True
-        )
+        self._alignments = Table("each-alignment-alone", tr("Each alignment alone"))
         self._another = QLabel()
         self._another.setWordWrap(True)
-        self._distances = DistanceTab()
-        self._compare = CompareTab()
-        self._compare.requested.connect(self.compare_requested)
-        self._compare.cancelled.connect(self.compare_cancelled)
-        self._fit_soon = fit_soon(self._fit, self)
+        self._distances = _DistanceTab()
+        self.comparison = _CompareTab()
         self._lay_out()
         self._add_copy()
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the results of a snapshot if they have changed."""
-        procedure, record = snapshot.procedure, snapshot.record
-        if procedure.results is not self._results:
-            self.show_results(procedure.results, record.alignments)
-        self.show_trials(record, snapshot.settings.solve.verdict.target_arcmin)
+        results, record = snapshot.procedure.results, snapshot.record
+        target_arcmin = snapshot.settings.solve.verdict.target_arcmin
+        if results is not self._results:
+            self.show_results(results, record, target_arcmin)
+        elif record is not self._record and results is not None:
+            self._show_eyes(results, record)
 
     def show_results(
-        self,
-        results: Results | None,
-        alignments: Mapping[int, Alignment],
-        *,
-        has_verdicts: bool = True,
+        self, results: Results | None, record: SessionRecord | None, target_arcmin: float = 0.0
     ) -> None:
-        """Show results, or a hint if there are none.
+        """Show the results of a session, or a hint if there are none.
 
-        Parameters
-        ----------
-        results : Results or None
-        alignments : mapping of int to Alignment
-            By number. A solved alignment that is missing here has no residual map, such as one
-            that could not be written to a full disk.
-        has_verdicts : bool
-            False if the page beside the panel shows the verdicts.
+        A solved alignment that the record does not hold has no residual map, such as one that could
+        not be written to a full disk.
         """
-        self._results, self._trials, self._judged = results, {}, {}
+        self._results, self._record, self._target_arcmin = results, record, target_arcmin
         self._copy.setEnabled(results is not None)
         self._stack.setCurrentIndex(0 if results is None else 1)
-        if results is None:
+        if results is None or record is None:
             self._tabs.setCurrentIndex(0)
             return
-        for card in self._cards.values():
-            card.setVisible(has_verdicts)
-        self._show_eyes(results)
+        self._show_eyes(results, record)
         if not results.alignments:
             self._choice.setCurrentIndex(0)
         self._choice.setEnabled(bool(results.alignments))
         for tab in (self._residuals, self._alone):
             self._tabs.setTabVisible(self._tabs.indexOf(tab), bool(results.alignments))
         self._convergence.show_results(results)
-        self._residuals.show_results(results, alignments)
+        self._residuals.show_results(results, record.alignments)
         self._alignments.show_rows([q.name for q in PHI], single_alignment_rows(results))
         self._another.setText(another_text(results))
         self._distances.show_results(results)
-        self._compare.show_results(results)
-        self._fit()
+        self.comparison.show_results(results)
 
-    def show_trials(self, record: SessionRecord, target_arcmin: float) -> None:
-        """Show the errors of a session's trials among the numbers, against the lab's target."""
-        if self._results is not None and record.trials is not self._trials:
-            self._trials = record.trials
-            self._judged = eye_trials(self._results, record, target_arcmin)
-            self._show_eyes(self._results)
-            self._fit()
-
-    def _show_eyes(self, results: Results) -> None:
+    def _show_eyes(self, results: Results, record: SessionRecord) -> None:
         """Show the verdicts and the numbers of both eyes, with those of their trials."""
-        for eye, card in self._cards.items():
-            card.show_verdict(results, self._judged.get(eye))
-        row = trial_row(self._judged, self._trials.values()) if self._trials else None
+        self._record = record
+        self._card.show_results(results, record, self._target_arcmin)
+        judged = eye_trials(results, record, self._target_arcmin)
+        row = trial_row(judged, record.trials.values()) if record.trials else None
         names = [EYE_NAMES[eye] for eye in EYES]
         self._numbers.show_rows(names, result_rows(results, row))
 
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Fit the tab of the eyes into the panel."""
-        super().resizeEvent(event)
-        self._fit_soon.start()
-
-    def show_comparison(self, other: Results) -> None:
-        """Show the results of another method for the same alignments."""
-        self._compare.show_comparison(other)
-
-    def show_comparison_progress(self, _doing: str, share: float) -> None:
-        """Show the share of the alignments that the other method has solved."""
-        self._compare.show_progress(share)
-
-    def comparison_failed(self, text: str) -> None:
-        """Show the reason why there is no comparison."""
-        self._compare.show_failure(text)
-
     def as_text(self) -> str:
         """Return all numbers shown as tab-separated text."""
-        if self._results is None:
+        if self._results is None or self._record is None:
             return ""
-        rows = verdict_rows(self._results, self._judged)
+        judged = eye_trials(self._results, self._record, self._target_arcmin)
+        rows = verdict_rows(self._results, judged)
         verdicts = rows_as_text((tr("Verdict"), tr("Reason")), rows)
-        tables = self._numbers, self._alignments, self._distances.table, self._compare.table
-        return "\n\n".join([verdicts, *(table.as_text() for table in tables if table.rowCount())])
-
-    def _fit(self) -> None:
-        """Show the reasons of the verdicts only where the numbers fit below them."""
-        width_px = (self.width() - 2 * SPACING_PX) // 2
-        room_px = self.height() - self._tabs.tabBar().sizeHint().height() - _MARGINS_PX
-        for is_shown in (True, False):
-            for card in self._cards.values():
-                card.show_reason(is_shown)
-            cards_px = max(
-                max(card.sizeHint().height(), card.heightForWidth(width_px))
-                for card in self._cards.values()
-            )
-            if cards_px + self._numbers.whole_height_px <= room_px:
-                break
+        tables = self._numbers, self._alignments, self._distances.table, self.comparison.table
+        return "\n\n".join([verdicts, *(table.as_text() for table in tables if table.keys)])
 
     def _add_copy(self) -> None:
         self._copy = add_action(
@@ -208,7 +191,6 @@ class ResultsPanel(QWidget):
         empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
         empty.setContentsMargins(*4 * (2 * SPACING_PX,))
         self._tabs = tabs = QTabWidget()
-        tabs.setTabBar(TabBar())
         tabs.setObjectName("results-tabs")
         tabs.setDocumentMode(True)
         tabs.setUsesScrollButtons(False)  # a long title is shortened instead
@@ -218,17 +200,18 @@ class ResultsPanel(QWidget):
         tabs.setTabToolTip(1, tr("Error against distance, and convergence of each registration"))
         tabs.addTab(self._residuals, tr("Residuals"))
         self._alone = self._alignments_tab()
-        tabs.addTab(self._alone, tr("Single"))
+        tabs.addTab(self._alone, tr("Alignments"))
         tabs.setTabToolTip(3, tr("φ of each alignment alone"))
-        tabs.addTab(self._compare, tr("Compare"))
+        tabs.addTab(self.comparison, tr("Other method"))
         self._stack = QStackedLayout(self)
         self._stack.addWidget(empty)
         self._stack.addWidget(tabs)
 
     def _eyes_tab(self) -> QWidget:
-        cards = hbox(*((card, 1) for card in self._cards.values()), spacing=SPACING_PX)
         tab = QWidget()
-        vbox(cards, (self._numbers, 1), on=tab, margins=SPACING_PX // 2, spacing=SPACING_PX // 2)
+        vbox(
+            self._card, (self._numbers, 1), on=tab, margins=SPACING_PX // 2, spacing=SPACING_PX // 2
+        )
         return tab
 
     def _plots_tab(self) -> QWidget:
@@ -254,3 +237,248 @@ class ResultsPanel(QWidget):
         meaning = paragraph("", _ALONE)
         vbox((self._alignments, 1), meaning, self._another, on=tab, spacing=SPACING_PX)
         return tab
+
+
+class _DistanceTab(QWidget):
+    """Shows each eye's error against distance, without the calibration and with it."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.plot = Plot(
+            "error-by-distance",
+            tr("Error against distance"),
+            tr("Distance (m)"),
+            tr("Expected error (′)"),
+        )
+        self.plot.show_legend()
+        ticks = [(float(np.log10(one)), f"{one:g}") for one in DISTANCES_M if one not in (0.4, 0.6)]
+        self.plot.item.getAxis("bottom").setTicks([ticks])
+        self.table = Table("error-by-distance-table", tr("Error against distance"))
+        meaning = paragraph("", _DISTANCES)
+        meaning.setContentsMargins(SPACING_PX, 0, SPACING_PX, SPACING_PX // 2)
+        vbox((self.plot, 1), (self.table, 1), meaning, on=self, margins=0, spacing=0)
+
+    def show_results(self, results: Results) -> None:
+        """Replace the lines and the table."""
+        self.plot.clear()
+        x = np.log10(DISTANCES_M)
+        columns: dict[str, tuple[str, ...]] = {}
+        for eye, benefit in results.benefits.items():
+            names = tr("{}, without").format(EYE_NAMES[eye]), tr("{}, with").format(EYE_NAMES[eye])
+            texts = zip(*(one.texts for one in benefit.by_distance), strict=True)
+            columns |= dict(zip(names, texts, strict=True))
+            for which in ("without", "after"):
+                error, low, high = (
+                    [getattr(one, f"{which}{end}_arcmin") for one in benefit.by_distance]
+                    for end in ("", "_low", "_high")
+                )
+                line = self.plot.add_line(
+                    eye, name=EYE_NAMES[eye], dashed=which == "without", symbol=_SYMBOLS[eye]
+                )
+                line.setData(x + _BESIDE[eye], error)
+                ends = np.column_stack([low, high, np.full(len(x), np.nan)])
+                self.plot.add_line(eye).setData(np.repeat(x + _BESIDE[eye], 3), ends.ravel())
+        rows = zip(*columns.values(), strict=True)
+        self.table.show_rows(
+            list(columns),
+            [Row(f"{one:g} m", cells) for one, cells in zip(DISTANCES_M, rows, strict=True)],
+        )
+
+
+class _ConvergencePlot(Plot):
+    """Shows the distance between hand and cursor by iteration, for each alignment and eye."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__("convergence", tr("Convergence"), tr("Iteration"), _TO_POINTS, parent)
+        self.show_legend()
+        self._longest = 1
+        self.item.vb.sigResized.connect(self._leave_room)
+
+    def show_results(self, results: Results) -> None:
+        """Replace the lines; each ends in its alignment's name."""
+        self.clear()
+        ends: list[tuple[float, int]] = []
+        for number, shifts in results.alignments.items():
+            for eye, shift in shifts.items():
+                rms_mm = 1e3 * np.sqrt(shift.history_m2)
+                line = self.add_line(
+                    eye,
+                    name=EYE_NAMES[eye],
+                    dashed=eye == "right",
+                    symbol=_SYMBOLS[eye] if len(rms_mm) <= _MAX_SYMBOLS else None,
+                )
+                line.setData(np.arange(1, len(rms_mm) + 1), rms_mm)
+                ends.append((float(rms_mm[-1]), number))
+        solved = [shift for eyes in results.alignments.values() for shift in eyes.values()]
+        measure = _TO_SURFACE if any(map(_is_to_surface, solved)) else _TO_POINTS
+        self.item.setLabel("left", measure)
+        self.setToolTip(_MEANINGS[measure])
+        histories = [shift.history_m2 for shift in solved]
+        self._longest = longest = max(map(len, histories), default=1)
+        largest_mm = 1e3 * max((float(np.sqrt(max(one))) for one in histories), default=1e-3)
+        self._name(sorted(ends), _TEXT_HEIGHT * largest_mm)
+        self._leave_room()
+        self.item.setYRange(0.0, 1.1 * largest_mm)
+        spacing = max(1, longest // 5)
+        self.item.getAxis("bottom").setTickSpacing(spacing, spacing)
+
+    def _leave_room(self) -> None:
+        """Show the iterations, with space for the longest name at their end."""
+        room_px = self.item.vb.width()
+        text_px = self.widest_text_px + 3 * SPACING_PX
+        share = min(text_px / max(room_px, 1.0), _MOST_FOR_NAMES)
+        self.item.setXRange(1, 1 + (self._longest - 1 or 1) / (1.0 - share), padding=0.03)
+
+    def _name(self, ends: list[tuple[float, int]], height_mm: float) -> None:
+        """Name the alignments beside the ends of their lines, in one text for those that adjoin."""
+        while ends:
+            beside = [one for one in ends if one[0] - ends[0][0] <= height_mm]
+            text = _names(sorted({number for _, number in beside}))
+            # Right of all lines, because one that goes on would cross the name.
+            self.add_text(text, self._longest, float(np.mean([y_mm for y_mm, _ in beside])))
+            ends = ends[len(beside) :]
+
+
+def _is_to_surface(shift: EyeShift) -> bool:
+    """Return whether an alignment's history was measured along normals, unlike its RMS."""
+    is_rms = np.isclose(shift.history_m2[-1], shift.rms_m**2, rtol=1e-6, atol=0.0)
+    return shift.method == "consistent" and not is_rms
+
+
+def _names(numbers: list[int]) -> str:
+    """Return *Alignment 1*, *Alignments 1, 2*, or *Alignments 1–5*."""
+    if len(numbers) == 1:
+        return tr("Alignment {}").format(numbers[0])
+    is_row = len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1
+    text = f"{numbers[0]}–{numbers[-1]}" if is_row else ", ".join(map(str, numbers))
+    return tr("Alignments {}").format(text)
+
+
+class _CompareTab(QWidget):
+    """Solves the same alignments with another method, and shows both results.
+
+    Attributes
+    ----------
+    table : Table
+    """
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("comparison")
+        self._results: Results | None = None
+        self._record: SessionRecord | None = None
+        self._settings = SolveSettings()
+        self._job: Job | None = None
+        self.table = Table("comparison-of-methods", tr("Comparison of methods"))
+        keep_space(self.table)
+        self._methods = QComboBox()
+        self._methods.setObjectName("comparison-method")
+        self._methods.setAccessibleName(tr("Compare with method"))
+        self._methods.currentTextChanged.connect(self._explain)
+        self._compare = QPushButton(tr("&Compare"))
+        self._compare.setObjectName("comparison-start")
+        self._compare.clicked.connect(self._ask)
+        self._cancel = QPushButton(tr("Ca&ncel"))
+        self._cancel.setObjectName("comparison-cancel")
+        self._cancel.clicked.connect(self._request_cancel)
+        self._progress = with_name(
+            QProgressBar(format="%p %"), "comparison-progress", tr("Progress")
+        )
+        self._progress.setTextVisible(False)
+        keep_space(self._progress)
+        self._progress.setMaximumHeight(SPACING_PX)
+        self._status = QLabel()
+        self._status.setObjectName("comparison-status")
+        self._status.setTextFormat(Qt.TextFormat.PlainText)
+        self._status.setWordWrap(True)
+        self._lay_out()
+        self._set_busy(False)
+
+    def use(self, record: SessionRecord, settings: SolveSettings) -> None:
+        """Set the session to compare with."""
+        self._record, self._settings = record, settings
+
+    def cancel(self) -> None:
+        """Cancel the comparison, and wait for its end; nothing is shown."""
+        if self._job is not None:
+            self._job.abandon()
+            self._job = None
+
+    def show_results(self, results: Results) -> None:
+        """Set the results to compare with; an earlier comparison is removed."""
+        if self._cancel.isEnabled():
+            self._request_cancel()
+        self._results = results
+        self._methods.clear()
+        for method in METHODS:
+            if method != results.method:
+                self._methods.addItem(method)
+        self.table.show_rows((), ())
+        self.table.hide()
+
+    def show_comparison(self, other: Results) -> None:
+        """Show another method's results of the same alignments."""
+        self._set_busy(False)
+        if self._results is None:
+            return
+        columns = self._results.method, other.method, "Δ"
+        self.table.show_rows(columns, comparison_rows(self._results, other))
+        self.table.show()
+        self._status.setText(
+            tr(
+                "Δ: {} minus {}. σ and expected error are realistic only for "
+                "“consistent”; the other methods' are too small."
+            ).format(other.method, self._results.method)
+        )
+
+    def show_failure(self, text: str) -> None:
+        """Show the reason why there is no comparison."""
+        self._set_busy(False)
+        self._status.setText(text)
+
+    def _explain(self, method: Method | Literal[""]) -> None:
+        text = tr("{}: {} Compare shows it beside the present results.")
+        self._status.setText(text.format(method, _METHODS[method]) if method else "")
+
+    def _ask(self) -> None:
+        method: Method = self._methods.currentText()  # type: ignore[assignment]
+        self._set_busy(True)
+        self._status.setText(tr("Solving with {} …").format(method))
+        self.cancel()
+        record, settings = self._record, replace(self._settings, method=method)
+
+        def work(progress: Progress) -> object:
+            assert record is not None
+            return solve_again(record, settings, progress)
+
+        self._job = Job(work)
+        self._job.progressed.connect(lambda _doing, share: show_share(self._progress, share))
+        self._job.succeeded.connect(self.show_comparison)
+        self._job.failed.connect(self.show_failure)
+        self._job.start()
+
+    def _request_cancel(self) -> None:
+        self._set_busy(False)
+        self._status.setText(tr("Cancelled."))
+        if self._job is not None:  # without waiting: a method may take seconds to react
+            self._job.cancel()
+            self._job.succeeded.disconnect()
+            self._job.failed.disconnect()
+
+    def _set_busy(self, is_busy: bool) -> None:
+        self._progress.setRange(0, 0)
+        self._progress.setVisible(is_busy)
+        has_focus = self._compare.hasFocus() or self._cancel.hasFocus()
+        for one, is_offered in ((self._cancel, is_busy), (self._compare, not is_busy)):
+            one.setVisible(is_offered)  # in the same place
+            one.setEnabled(is_offered)
+            if is_offered and has_focus:
+                one.setFocus()
+        self._methods.setEnabled(not is_busy)
+
+    def _lay_out(self) -> None:
+        label = QLabel(tr("Compare &with"))
+        label.setBuddy(self._methods)
+        row = hbox(label, (self._methods, 1), self._compare, self._cancel, spacing=SPACING_PX)
+        parts = row, self._progress, self._status, (self.table, 1)
+        vbox(*parts, on=self, margins=SPACING_PX // 2, spacing=SPACING_PX)

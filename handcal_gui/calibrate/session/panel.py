@@ -1,42 +1,42 @@
-"""The session panel: alignments, trials and notes of a session, with undo of deletions."""
+"""The session panel: alignments and notes of a session, with undo of deletions."""
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Callable
+from pathlib import Path
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QSignalBlocker, Qt, QTimer
+from PySide6.QtGui import QTextDocument
 from PySide6.QtWidgets import (
     QFormLayout,
     QLabel,
     QLineEdit,
+    QPlainTextEdit,
     QPushButton,
     QWidget,
 )
 
 from handcal.core.types import EyeDistance
 from handcal.register.results import Results
-from handcal.session.session import SessionRecord
+from handcal.session.session import MAX_NOTES_CHARACTERS, SessionRecord
 from handcal.session.state import SessionEvent
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
 from handcal_gui.calibrate.parts.record_tabs import RecordTabs
 from handcal_gui.calibrate.parts.undo_strip import UndoStrip
-from handcal_gui.calibrate.session.notes_editor import NotesEditor
+from handcal_gui.engine.engine_thread import Submit, calibrating, no_engine
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import paragraph, with_name
 from handcal_gui.widgets.layouts import hbox, keep_space, vbox
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.opening import open_path
-from handcal_gui.widgets.record_table import RecordTable
 from handcal_gui.widgets.session_rows import (
     ALIGNMENT_COLUMNS,
-    TRIAL_COLUMNS,
     alignment_rows,
     deletions,
-    trial_rows,
-    trials_id,
 )
+from handcal_gui.widgets.table import Table
 from handcal_gui.widgets.times import local_time
 
 _EYE_DISTANCE_HELP = tr(
@@ -45,32 +45,27 @@ _EYE_DISTANCE_HELP = tr(
     "A change discards the results: solve again."
 )
 
+SAVE_MS = 800
+_WRITE = tr("Notes on this session; saved automatically")
+_RESUME = tr("This session is only shown. To write notes, resume it.")
+
 
 class SessionPanel(QWidget):
-    """Shows a session, and requests changes to it.
+    """Shows a session, and changes it.
 
     Attributes
     ----------
-    delete_requested, restore_requested : Signal(str, int)
-        Kind and number of the alignment or trial.
-    notes_changed : Signal(str)
-        The complete notes, 0.8 s after the last key.
-    eye_distance_changed : Signal(EyeDistance or None)
-        The wearer's, as typed; None if it is not measured.
-    export_requested, inspect_requested : Signal()
+    submit : callable
+        Gives the engine a command.
+    notes : NotesEditor
+    export_button, inspect_button : QPushButton
     """
-
-    delete_requested = Signal(str, int)
-    restore_requested = Signal(str, int)
-    notes_changed = Signal(str)
-    eye_distance_changed = Signal(object)
-    export_requested = Signal()
-    inspect_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("session")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.submit: Submit = no_engine
         self._record: SessionRecord | None = None
         self._results: Results | None = None
         self._is_read_only = False
@@ -80,33 +75,31 @@ class SessionPanel(QWidget):
         )
         self._eye_distance.editingFinished.connect(self._take_eye_distance)
         self._eye_distance_problem = paragraph("eyeDistanceProblem")
-        self._alignments = RecordTable(
+        self._alignments = Table(
             "alignments",
             tr("Alignments"),
-            ALIGNMENT_COLUMNS,
             tr("Confirmed alignments appear here once they are written"),
+            "one",
         )
-        self._alignments.delete_requested.connect(partial(self.delete_requested.emit, "alignment"))
-        self._trials = RecordTable(
-            "trials-of-the-session",
-            tr("Trials of the session"),
-            TRIAL_COLUMNS,
-            tr("Recorded trials appear here"),
+        self._alignments.offer_delete(
+            lambda number: self.submit(
+                tr("delete the alignment"), lambda s: s.delete("alignment", number)
+            )
         )
-        self._trials.delete_requested.connect(partial(self.delete_requested.emit, "trial"))
-        self._notes = NotesEditor()
-        self._notes.changed.connect(self.notes_changed)
+        self.notes = NotesEditor()
         self._unwritten = paragraph("unwritten")
         self._unwritten.hide()
         self._meaning = ElidedLabel()
         self._strip = UndoStrip(self)
         self._strip.restore_requested.connect(
-            lambda deletion: self.restore_requested.emit(deletion.kind, deletion.number)
+            lambda one: self.submit(
+                tr("restore the {}").format(one.kind), lambda s: s.restore(one.kind, one.number)
+            )
         )
         self._tabs = RecordTabs()
         self._open_folder = QPushButton(tr("&Open folder"))
-        self._inspect = QPushButton(tr("I&nspect in 3D"))
-        self._export = QPushButton(tr("Ex&port…"))
+        self.inspect_button = QPushButton(tr("I&nspect in 3D"))
+        self.export_button = QPushButton(tr("Ex&port…"))
         self._lay_out()
         self._refresh()
 
@@ -133,39 +126,24 @@ class SessionPanel(QWidget):
         before, self._record, self._results = self._record, record, results
         if before is None or before.path != record.path:
             self._eye_distance.setModified(False)
-        self._alignments.show_rows(alignment_rows(record, results))
-        if before is None or trials_id(before) != trials_id(record):
-            self._trials.show_rows(trial_rows(record))
-        self._notes.show_saved(record.path, record.notes)
+        self._alignments.show_rows(ALIGNMENT_COLUMNS, alignment_rows(record, results))
+        self.notes.show_saved(record.path, record.notes)
         self._unwritten.hide()
         self._refresh()
 
     def set_read_only(self, is_read_only: bool) -> None:
         """Set the panel read-only: the session can still be exported."""
         self._is_read_only = is_read_only
-        for part in (self._alignments, self._trials, self._notes):
+        for part in (self._alignments, self.notes):
             part.set_read_only(is_read_only)
         self._refresh()
-
-    @property
-    def notes_are_saved(self) -> bool:
-        """True if the notes written are those stored."""
-        return self._notes.are_saved
-
-    def save_notes(self) -> None:
-        """Request to save the notes now."""
-        self._notes.save_now()
-
-    def flush(self) -> None:
-        """Save pending changes of the notes now."""
-        self._notes.flush()
 
     def _refresh(self) -> None:
         record = self._record
         self._show_note()
         self._open_folder.setEnabled(record is not None)
-        self._inspect.setEnabled(record is not None and bool(record.alignments))
-        self._export.setEnabled(record is not None)
+        self.inspect_button.setEnabled(record is not None and bool(record.alignments))
+        self.export_button.setEnabled(record is not None)
         self._eye_distance.setEnabled(record is not None and not self._is_read_only)
         if record is None:
             self._wearer.setText("–")
@@ -180,15 +158,12 @@ class SessionPanel(QWidget):
             self._show_eye_distance(record.facts.eye_distance)
         self._strip.show_deletions([] if self._is_read_only else deletions(record))
         self._tabs.setTabText(0, tr("Alignments ({})").format(len(record.alignments)))
-        self._tabs.setTabText(1, tr("Trials ({})").format(len(record.trials)))
 
     def _show_note(self) -> None:
         """Explain the numbers of alignments or trials while they are in sight."""
         record, shown, meaning = self._record, self._tabs.currentWidget(), ""
         if record is not None and record.alignments and shown is self._alignments:
             meaning = tr("φ of each alignment alone; the result is in Results")
-        elif record is not None and record.trials and shown is self._trials:
-            meaning = tr("Error: between the calibrated φ and the fine-tuned one")
         self._meaning.setText(meaning)
         self._meaning.setVisible(bool(meaning))
 
@@ -214,7 +189,7 @@ class SessionPanel(QWidget):
             self._eye_distance_problem.show()
             return
         self._show_eye_distance(stored)  # until the session holds the new one
-        self.eye_distance_changed.emit(typed)
+        self.submit(tr("set the eye distance"), calibrating(lambda c: c.set_eye_distance(typed)))
 
     def _show_folder(self) -> None:
         if self._record is not None:
@@ -223,12 +198,10 @@ class SessionPanel(QWidget):
     def _lay_out(self) -> None:
         self._open_folder.setToolTip(tr("Show the session's folder in the file manager"))
         self._open_folder.clicked.connect(self._show_folder)
-        self._inspect.setToolTip(
+        self.inspect_button.setToolTip(
             tr("Show clouds, residuals, eyes and displays in a separate 3D window (needs Open3D)")
         )
-        self._inspect.clicked.connect(self.inspect_requested)
-        self._export.setToolTip(tr("Write a report, tables and calibration files"))
-        self._export.clicked.connect(self.export_requested)
+        self.export_button.setToolTip(tr("Write a report, tables and calibration files"))
         form = QFormLayout()
         form.setVerticalSpacing(SPACING_PX // 2)
         form.addRow(tr("Wearer"), self._wearer)
@@ -238,11 +211,10 @@ class SessionPanel(QWidget):
         form.addRow(self._eye_distance_problem)
         self._eye_distance_problem.hide()
         self._tabs.addTab(self._alignments, tr("Alignments"))
-        self._tabs.addTab(self._trials, tr("Trials"))
-        self._tabs.addTab(self._notes, tr("Notes"))
+        self._tabs.addTab(self.notes, tr("Notes"))
         keep_space(self._strip.button)
-        buttons = self._strip.button, (QWidget(), 1), self._open_folder, self._inspect, self._export
-        row = hbox(*buttons, spacing=SPACING_PX)
+        buttons = self._open_folder, self.inspect_button, self.export_button
+        row = hbox(self._strip.button, 1, *buttons, spacing=SPACING_PX)
         self._tabs.currentChanged.connect(self._show_note)
         parts = form, (self._tabs, 1), self._unwritten, self._meaning, self._strip, row
         vbox(*parts, on=self, margins=SPACING_PX, spacing=SPACING_PX)
@@ -255,3 +227,95 @@ def _read_eye_distance(text: str) -> EyeDistance:
     except ValueError:
         raise ValueError(tr("the eye distance must be a number; enter 45 to 85 mm")) from None
     return EyeDistance(1e-3 * value_mm)
+
+
+class NotesEditor(QWidget):
+    """Edits the notes on a session, and shows whether they are saved.
+
+    Attributes
+    ----------
+    save : callable
+        Given the complete notes to save, 0.8 s after the last key.
+    """
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.save: Callable[[str], object] = lambda _text: None
+        self._session: Path | None = None
+        self._saved = ""
+        self._edit = QPlainTextEdit()
+        self._edit.setAccessibleName(tr("Notes on the session"))
+        self._edit.setPlaceholderText(_WRITE)
+        self._edit.setTabChangesFocus(True)
+        self._edit.setEnabled(False)
+        self._edit.textChanged.connect(self._begin)
+        self._state = QLabel()
+        self._state.setObjectName("notesState")
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.setInterval(SAVE_MS)
+        self._timer.timeout.connect(self._save)
+        vbox(self._edit, self._state, on=self, margins=0, spacing=SPACING_PX // 2)
+
+    def show_saved(self, session: Path, notes: str) -> None:
+        """Set the saved notes; the text being edited is replaced only for another session."""
+        self._saved = _as_shown(notes)
+        if session != self._session:
+            self._session = session
+            self._timer.stop()
+            with QSignalBlocker(self._edit):
+                self._edit.setPlainText(notes)
+            self._edit.setEnabled(True)
+        self._refresh()
+
+    def set_read_only(self, is_read_only: bool) -> None:
+        """Set the editor read-only or editable."""
+        self._edit.setReadOnly(is_read_only)
+        self._edit.setPlaceholderText(_RESUME if is_read_only else _WRITE)
+        self._refresh()
+
+    @property
+    def are_saved(self) -> bool:
+        """True if what is written is what is stored."""
+        return self._edit.toPlainText() == self._saved
+
+    def save_now(self) -> None:
+        """Save what is written, also if it is too long, which gives the reason."""
+        self._timer.stop()
+        self.save(self._edit.toPlainText())
+
+    def flush(self) -> None:
+        """Save now what is not saved, also what could not be saved before; at a session's end."""
+        self._timer.stop()
+        if not self.are_saved:
+            self._saved = self._edit.toPlainText()  # the next session begins before it is shown
+            self._save()
+
+    def _begin(self) -> None:
+        self._timer.start()
+        self._refresh()
+
+    def _save(self) -> None:
+        if self._too_many() <= 0:
+            self.save(self._edit.toPlainText())
+
+    def _too_many(self) -> int:
+        return len(self._edit.toPlainText()) - MAX_NOTES_CHARACTERS
+
+    def _refresh(self) -> None:
+        if self._session is None:
+            text = ""
+        elif self._edit.isReadOnly():
+            text = _RESUME if self._saved else ""  # or the empty editor says it
+        elif self._too_many() > 0:
+            text = tr("⚠ Too long by {:,} characters: not saved").format(self._too_many())
+        else:
+            saved = tr("✓ Saved") if self._saved else ""  # nothing is written yet
+            text = saved if self.are_saved else tr("Not saved yet")
+        self._state.setText(text)
+        self._state.setVisible(bool(text))  # empty, it was a bar below the notes
+
+
+def _as_shown(notes: str) -> str:
+    """Return notes as the editor does: with its own line ends, and without no-break spaces."""
+    return QTextDocument(notes).toPlainText()

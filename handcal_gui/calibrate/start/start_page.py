@@ -7,8 +7,16 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent, QShowEvent
-from PySide6.QtWidgets import QFileDialog, QGridLayout, QLabel, QSizePolicy, QWidget
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QGridLayout,
+    QLabel,
+    QMessageBox,
+    QSizePolicy,
+    QWidget,
+)
 
+from handcal.session.session import SessionRecord
 from handcal.station.checks.preflight import check_station
 from handcal_gui.app.preferences import CurrentPreferences, Preferences
 from handcal_gui.app.theme import SPACING_PX, font_px, scale_font
@@ -18,8 +26,9 @@ from handcal_gui.calibrate.start.new_calibration import Check, NewCalibration
 from handcal_gui.calibrate.start.session_entries import KnownSessions, find_sessions
 from handcal_gui.calibrate.start.session_list import SessionList
 from handcal_gui.engine.latest_job import LatestJob
-from handcal_gui.widgets.fields import button
+from handcal_gui.widgets.fields import button, plain_message
 from handcal_gui.widgets.layouts import fit_soon, hbox, scrollable, vbox
+from handcal_gui.widgets.times import local_time
 
 FindOffers = Callable[[Path, Sequence[Path]], KnownSessions]
 
@@ -27,6 +36,25 @@ _LARGEST_PX = 1600, 1000
 """Size beyond which a larger window leaves room around the page."""
 _LOW = 46
 """Height below which the page has no head, in sizes of the font."""
+
+
+def ask_whether_worn(parent: QWidget, record: SessionRecord) -> bool | None:
+    """Ask whether the headset stayed on since a session's last event; None to do nothing."""
+    wearer = record.wearer or tr("the wearer")
+    text = tr("Did the headset stay on {} since {}?\n\n").format(
+        wearer, local_time(record.events[-1].time)
+    ) + tr(
+        "If it was taken off or has slipped, it sits differently now. Then a new session begins "
+        "from this result, and the wearer verifies each eye first."
+    )
+    box = QMessageBox(QMessageBox.Icon.Question, tr("Resume"), plain_message(text), parent=parent)
+    worn = box.addButton(tr("It &stayed on"), QMessageBox.ButtonRole.YesRole)
+    moved = box.addButton(tr("It was taken &off"), QMessageBox.ButtonRole.NoRole)
+    box.addButton(QMessageBox.StandardButton.Cancel)
+    box.setDefaultButton(moved)  # which is right in either case
+    box.exec()
+    clicked = box.clickedButton()
+    return None if clicked not in (worn, moved) else clicked is worn
 
 
 class StartPage(QWidget):

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
 from handcal.session.comparison import Answer, Place
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
-from handcal_gui.widgets.fields import button, one_of, paragraph, stand_out_while_checked
+from handcal_gui.engine.engine_thread import Command, Submit, no_engine
+from handcal_gui.widgets.fields import button, one_of, stand_out_while_checked
 from handcal_gui.widgets.layouts import hbox, vbox
-from handcal_gui.widgets.numbers import pluralize
 
 _SHOW: dict[Place, str] = {"first": tr("Sho&w first"), "second": tr("Sh&ow second")}
 _ANSWERS: dict[Answer, str] = {
@@ -20,7 +19,7 @@ _ANSWERS: dict[Answer, str] = {
 }
 _COMPARE_HELP = tr(
     "Show the wearer the drawing without and with the calibration, in a hidden random order,\n"
-    "and record which fits the hand better. The report says which was which."
+    "and record which fits the hand better. The result stands below the trials."
 )
 
 
@@ -36,36 +35,28 @@ class ComparisonRow(QWidget):
 
     Attributes
     ----------
-    begun : Signal()
-    ended : Signal()
-        The comparison is to end without an answer.
-    show_requested : Signal(str)
-        "first" or "second".
-    answered : Signal(str)
-        "first", "second" or "neither".
+    submit : callable
+        Gives the engine a command.
     """
-
-    begun = Signal()
-    ended = Signal()
-    show_requested = Signal(str)
-    answered = Signal(str)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._begin = button("compare", tr("Blinded &comparison"), help_text=_COMPARE_HELP)
-        self._count = paragraph("compared")
+        self.submit: Submit = no_engine
         self._show = {place: button(f"show-{place}", text) for place, text in _SHOW.items()}
         self._answers = {one: button(f"answer-{one}", text) for one, text in _ANSWERS.items()}
         self._end = button("compareEnd", tr("Stop com&paring"))
         self._shown: Place | None = None
-        self._begin.clicked.connect(self.begun)
-        self._end.clicked.connect(self.ended)
+        self._begin.clicked.connect(lambda: self._do(lambda s: s.trials.compare()))
+        self._end.clicked.connect(lambda: self._do(lambda s: s.trials.comparing.end()))
         for place, one in self._show.items():
             one.setCheckable(True)
             stand_out_while_checked(one)
             one.clicked.connect(lambda _=False, place=place: self._ask(place))
         for answer, one in self._answers.items():
-            one.clicked.connect(lambda _=False, answer=answer: self.answered.emit(answer))
+            one.clicked.connect(
+                lambda _=False, answer=answer: self._do(lambda s: s.trials.comparing.answer(answer))
+            )
         self._how = one_of({"compareLook": _LOOK, "compareAsk": _ASK})
         self._running = QWidget()
         vbox(
@@ -77,23 +68,16 @@ class ComparisonRow(QWidget):
             spacing=SPACING_PX,
         )
         self._idle = QWidget()
-        hbox(self._begin, (self._count, 1), on=self._idle, margins=0, spacing=SPACING_PX)
+        hbox(self._begin, 1, on=self._idle, margins=0, spacing=SPACING_PX)
         vbox(self._idle, self._running, on=self, margins=0)
-        self.show_comparison(None, has_seen_both=False, can_begin=False, count=0)
+        self.show_comparison(None, has_seen_both=False, can_begin=False)
 
-    def show_comparison(
-        self, shown: Place | None, *, has_seen_both: bool, can_begin: bool, count: int
-    ) -> None:
-        """Show the drawing that is compared, None while there is none, and the number made."""
+    def show_comparison(self, shown: Place | None, *, has_seen_both: bool, can_begin: bool) -> None:
+        """Show the drawing that is compared; None while there is none."""
         self._shown = shown
         self._idle.setVisible(shown is None)
         self._running.setVisible(shown is not None)
         self._begin.setEnabled(can_begin)
-        self._count.setText(
-            tr("{} recorded").format(pluralize(count, tr("comparison"), tr("comparisons")))
-            if count
-            else ""
-        )
         for place, one in self._show.items():
             one.setChecked(place == shown)
         self._how.setCurrentIndex(int(has_seen_both))
@@ -104,4 +88,7 @@ class ComparisonRow(QWidget):
     def _ask(self, place: Place) -> None:
         """Request a drawing; its button is checked once the station shows it."""
         self._show[place].setChecked(place == self._shown)
-        self.show_requested.emit(place)
+        self._do(lambda s: s.trials.comparing.show(place))
+
+    def _do(self, command: Command) -> None:
+        self.submit(tr("compare"), command)

@@ -18,7 +18,7 @@ from handcal_gui.app.preferences import PreferencesFile
 from handcal_gui.app.program import Program
 from handcal_gui.calibrate.window import MainWindow
 from handcal_gui.library.window import LibraryWindow
-from handcal_gui.widgets.record_table import RecordTable
+from handcal_gui.widgets.table import Table
 from tests.gui.helpers import child
 
 
@@ -48,7 +48,7 @@ def test_what_can_be_deleted_and_restored_in_a_panel_is_offered(
     session = window.panels.session
     session.show_record(record, results)
     window.go_to("session")
-    child(session, RecordTable, "alignments").selectRow(1)
+    child(session, Table, "alignments").selectRow(1)
     with qtbot.waitSignal(session.delete_requested) as asked:
         offered(window)["Delete: Session\tDel"].trigger()
     assert asked.args == ["alignment", 2]

@@ -39,8 +39,7 @@ CHANGED = Preferences(
     hidden_layers=("cursor",),
     theme="dark",
     geometry="AAAA",
-    live_layout="BBBB",
-    review_layout="CCCC",
+    layout="BBBB",
 )
 
 

@@ -17,7 +17,7 @@ SOURCES = [
     if not path.relative_to(ROOT / "handcal_gui").as_posix().startswith(NO_WINDOW)
 ]
 SETTERS = {
-    "Finding", "ImageView", "NumberTable", "PathField", "QAction", "QCheckBox", "QGroupBox",
+    "Column", "Finding", "ImageView", "Table", "PathField", "QAction", "QCheckBox", "QGroupBox",
     "QLabel", "QPushButton", "QRadioButton", "Row", "addAction", "addButton", "addItem", "addMenu",
     "addRow", "addTab", "button", "choice", "label_for", "main_button", "number", "paragraph",
     "setAccessibleDescription", "setAccessibleName", "setHeaderLabels", "setLabelText",
@@ -26,7 +26,7 @@ SETTERS = {
 }  # fmt: skip
 """Functions that show a text."""
 WITH_IDENTIFIER = {
-    "NumberTable", "PathField", "addAction", "addItem", "button", "choice", "main_button", "number",
+    "Table", "PathField", "addAction", "addItem", "button", "choice", "main_button", "number",
     "paragraph", "whole_number", "with_name",
 }  # fmt: skip
 """Those that also take an identifier, such as an object name."""

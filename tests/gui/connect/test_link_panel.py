@@ -11,7 +11,7 @@ from pytestqt.qtbot import QtBot
 from handcal.station.snapshot import Snapshot
 from handcal_gui.connect.link_panel import LinkPanel
 from handcal_gui.widgets.number_label import UNKNOWN
-from handcal_gui.widgets.number_table import NumberTable
+from handcal_gui.widgets.table import Table
 from tests.gui.conftest import NOW_NS
 from tests.gui.helpers import button, child, show, text
 
@@ -26,7 +26,7 @@ def panel(qtbot: QtBot) -> LinkPanel:
 
 def numbers(panel: LinkPanel) -> dict[str, list[str]]:
     """Return the numbers by their names: to and from the headset."""
-    lines = child(panel, NumberTable).as_text().splitlines()[1:]
+    lines = child(panel, Table).as_text().splitlines()[1:]
     return {name: cells for name, *cells in (line.split("\t") for line in lines)}
 
 

@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
     QLabel,
     QProgressBar,
     QPushButton,
-    QTableWidget,
     QWidget,
 )
 from pytestqt.qtbot import QtBot
@@ -28,6 +27,7 @@ from handcal_gui.evaluate.evaluation_page import EvaluationPage
 from handcal_gui.evaluate.specs import make_specs
 from handcal_gui.evaluate.window import EvaluationWindow
 from handcal_gui.widgets.fields import MainButton
+from handcal_gui.widgets.table import Table
 from tests.gui.helpers import answer_questions, letters, note_opened
 
 Kind = TypeVar("Kind", bound=QWidget)
@@ -102,9 +102,7 @@ def test_a_study_runs_to_its_end(
     choice = student.child(QComboBox, "figures")
     titles = [choice.itemText(place) for place in range(choice.count())]
     assert titles == ["Numbers", "Terms and methods", "Some squares"]
-    item = student.child(QTableWidget, "numbers").item(9, 0)
-    assert item is not None
-    assert item.text() == "81"
+    assert student.child(Table, "numbers").model().index(9, 1).data() == "81"
     opened = note_opened(monkeypatch)
     for name in ("openPdf", "openHtml", "openFolder"):
         student.child(QPushButton, name).click()

@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QComboBox, QDialog, QLabel, QPushButton, QTableWidget
+from PySide6.QtWidgets import QApplication, QComboBox, QDialog, QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
-from handcal.report.document import Column, Figure, Report, Section, Table
+from handcal.report.document import Column, Figure, Report, Section
+from handcal.report.document import Table as ReportTable
 from handcal_gui.evaluate.results_view import ResultsView
 from handcal_gui.evaluate.work import Outcome
 from handcal_gui.widgets.image_view import ImageView
-from handcal_gui.widgets.number_table import NumberTable
+from handcal_gui.widgets.table import Table
 from tests.gui.helpers import child, show, text
 
 
@@ -38,7 +39,7 @@ def titles_of(view: ResultsView) -> list[str]:
 def test_a_tab_says_what_its_numbers_are_of(
     qtbot: QtBot, captions: tuple[str, ...], titles: list[str]
 ) -> None:
-    tables = [Table([Column("a"), Column("b")], [("1", "2")], one) for one in captions]
+    tables = [ReportTable([Column("a"), Column("b")], [("1", "2")], one) for one in captions]
     view = show(qtbot, ResultsView(), 500, 400)
     view.show_outcome(Outcome(Path(), Report("", "", "", [Section("", tables)]), []))
     assert titles_of(view) == titles
@@ -53,23 +54,21 @@ def test_the_numbers_of_a_user_test_fit_beside_the_list_of_a_small_screen(qtbot:
     titles = ["wearer", "calibrations", "corners", "mean ± SD, px", "mean ± SD, arcmin"]
     titles += ["95 % interval, arcmin", "median (quartiles), arcmin", "min–max, arcmin"]
     numbers = ("10", "120", "8.12 ± 4.33", "10.79 ± 3.21", "6.33 to 14.12", "9.83 (7.12–12.45)")
-    table = Table([Column(title) for title in titles], [("wearer-1", *numbers, "2.13–23.44")])
+    table = ReportTable([Column(title) for title in titles], [("wearer-1", *numbers, "2.13–23.44")])
     view = show(qtbot, ResultsView(), 719, 300)  # in a window of 960 x 540
     view.show_outcome(Outcome(Path(), Report("", "", "", [Section("", [table])]), []))
-    shown = child(view, NumberTable)
+    shown = child(view, Table)
     assert not shown.horizontalScrollBar().isVisible()
-    assert not shown.isColumnHidden(titles.index("median (quartiles), arcmin") - 1)
-    cell = shown.item(0, 0)
-    assert cell is not None
-    assert "min–max, arcmin: 2.13–23.44" in cell.toolTip()
-    assert "95 % interval, arcmin" in shown.as_text()
-    assert "no room for: min–max, arcmin. View large" in text(view, "caption")
+    hidden = [title.replace("\n", ", ") for title in shown.hidden]
+    assert hidden == titles[-len(hidden) :], "the last ones"
+    tooltip = shown.model().index(0, 0).data(Qt.ItemDataRole.ToolTipRole)
+    assert "min–max\narcmin: 2.13–23.44" in tooltip
+    assert f"no room for: {'; '.join(hidden)}. View large" in text(view, "caption")
     child(view, QPushButton, "enlarge").click()
     large = child(view, QDialog, "large")
     large.resize(960, 540)
     QApplication.processEvents()
-    table_shown = child(large, QTableWidget)
-    assert not any(table_shown.isColumnHidden(one) for one in range(len(titles) - 1))
+    assert not child(large, Table).hidden
     assert text(large, "caption") == ""
 
 

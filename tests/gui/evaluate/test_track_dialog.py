@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint
-from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QTableWidget
+from PySide6.QtWidgets import QComboBox, QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal.core.errors import CameraError
@@ -27,6 +27,7 @@ from handcal_gui.evaluate.devices import depth_camera, paired_headset
 from handcal_gui.evaluate.entries import CubeEntries
 from handcal_gui.evaluate.track_dialog import TrackDialog
 from handcal_gui.widgets.image_view import ImageView
+from handcal_gui.widgets.table import Table
 from tests.gui.helpers import child, letters
 
 Make = Callable[..., TrackDialog]
@@ -59,7 +60,7 @@ def finding(dialog: TrackDialog) -> str:
     return found.text()
 
 
-def darkest(table: QTableWidget) -> int:
+def darkest(table: Table) -> int:
     """Return the lightness of the darkest pixel of a table's cells, on a light ground."""
     picture = table.viewport().grab().toImage()
     places = ((x, y) for y in range(picture.height()) for x in range(picture.width()))
@@ -91,9 +92,8 @@ def test_the_simulated_cube_is_shown_with_its_pose_until_stopped(qtbot: QtBot, m
     assert dialog.form.y() == top_px
     assert not start.isEnabled()
     assert stop.text() == "S&top"
-    table = dialog.findChild(QTableWidget, "pose-of-the-cube")
-    assert isinstance(table, QTableWidget)
-    qtbot.waitUntil(lambda: table.rowCount() == 3, timeout=60_000)
+    table = child(dialog, Table, "pose-of-the-cube")
+    qtbot.waitUntil(lambda: len(table.keys) == 3, timeout=60_000)
     view = dialog.findChild(ImageView)
     assert isinstance(view, ImageView)
     assert view.has_image
@@ -147,7 +147,7 @@ def test_before_a_cube_is_seen_there_is_no_empty_table_and_nothing_is_cut(make: 
     dialog = make("network", track_cube)
     chosen = child(dialog, QComboBox, "trackedBy")
     assert chosen.width() >= chosen.sizeHint().width()
-    assert not child(dialog, QTableWidget, "pose-of-the-cube").isVisible()
+    assert not child(dialog, Table, "pose-of-the-cube").isVisible()
     assert "will be shown here" in child(dialog, ImageView).message
 
 

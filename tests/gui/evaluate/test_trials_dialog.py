@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel, QProgressBar, QPushButton, QTableWidget, QWidget
+from PySide6.QtWidgets import QLabel, QProgressBar, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.core.display import eye_projection
@@ -25,6 +25,7 @@ from handcal.session.trial import Trial
 from handcal.station.user_test.cube_trials import StudyLeader, TrialOrder
 from handcal_gui.evaluate.entries import UserEntries
 from handcal_gui.evaluate.trials_dialog import STEP_M, TrialsDialog
+from handcal_gui.widgets.table import Table
 from tests.gui.helpers import letters
 from tests.helpers import ROOT
 
@@ -104,8 +105,8 @@ def test_the_study_leader_places_the_cube_and_moves_the_drawing(
     part(dialog, QPushButton, "up").click()
     qtbot.waitUntil(lambda: len(recorder.drawn_m) == 3, timeout=20_000)
     follow.click()
-    table = part(dialog, QTableWidget, "trials-recorded")
-    qtbot.waitUntil(lambda: table.rowCount() == 1, timeout=20_000)
+    table = part(dialog, Table, "trials-recorded")
+    qtbot.waitUntil(lambda: len(table.keys) == 1, timeout=20_000)
     np.testing.assert_allclose(recorder.found_m, STEP_M * np.array([-2.0, 1.0, 0.0]))
     np.testing.assert_allclose(recorder.drawn_m[-1], recorder.found_m)
     display = example_rig().eyes["left"]

@@ -12,7 +12,6 @@ from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.session.judged_trials import EyeTrials, eye_trials
 from handcal.session.record import SessionRecord
 from handcal.session.trial import Trial, make_trial
-from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.result_rows import (
     NOTHING,
     PHI,
@@ -25,6 +24,7 @@ from handcal_gui.widgets.result_rows import (
     verdict_rows,
 )
 from handcal_gui.widgets.sentence import sentence
+from handcal_gui.widgets.table import Row
 from tests.gui.views import VERIFIED
 
 

@@ -40,9 +40,10 @@ def phi_mm(cells: Sequence[str]) -> list[list[float]]:
 
 
 def test_alignments_as_text(record: SessionRecord, results: Results) -> None:
-    rows = alignment_rows(record, results)
+    rows = {row.key: row.cells for row in alignment_rows(record, results)}
     assert list(rows) == [1, 2]
     for number, cells in rows.items():
+        assert isinstance(number, int)
         alignment, shifts = record.alignments[number], results.alignments[number]
         assert len(cells) == len(ALIGNMENT_COLUMNS)
         assert cells[:2] == (str(number), "Both eyes")
@@ -59,8 +60,8 @@ def test_alignments_as_text(record: SessionRecord, results: Results) -> None:
 
 def test_results_of_other_alignments_are_left_out(record: SessionRecord, results: Results) -> None:
     shorter = replace(record, alignments={1: record.alignments[1]})
-    assert alignment_rows(shorter, results)[1][3:8] == ("–",) * 5
-    assert alignment_rows(record, None)[2][3:8] == ("–",) * 5
+    assert alignment_rows(shorter, results)[0].cells[3:8] == ("–",) * 5
+    assert alignment_rows(record, None)[1].cells[3:8] == ("–",) * 5
 
 
 def test_one_eye_alone(
@@ -71,7 +72,8 @@ def test_one_eye_alone(
         results,
         alignments={1: {"right": results.alignments[1]["right"]}, 2: results.alignments[2]},
     )
-    cells = alignment_rows(replace(record, alignments={1: one, 2: alignments[1]}), alone)[1]
+    rows = alignment_rows(replace(record, alignments={1: one, 2: alignments[1]}), alone)
+    cells = rows[0].cells
     assert cells[1] == "Right eye"
     np.testing.assert_allclose(
         phi_mm(cells), [1e3 * results.alignments[1]["right"].shift_m], atol=0.005
@@ -83,7 +85,7 @@ def test_trials_as_text(record: SessionRecord) -> None:
     with Session(record.path) as session:
         session.save_trial(trial("right", 0.4, 0.001))
     after = Session.open(record.path)
-    cells = trial_rows(after)[1]
+    (cells,) = (row.cells for row in trial_rows(after))
     assert len(cells) == len(TRIAL_COLUMNS)
     assert cells[:3] == ("1", "Right eye", "0.4")
     assert float(cells[3]) == pytest.approx(after.trials[1].error_px.mean(), abs=0.05)

@@ -37,6 +37,8 @@ def open_program(
     # The tests' camera is slow on a busy computer.
     monkeypatch.setattr("handcal_gui.calibrate.control.conditions._SLOW_HZ", 0.0)
 
+    monkeypatch.setattr("handcal_gui.app.program.ask_whether_worn", lambda *_: True)
+
     def open_program() -> Technician:
         program = Program(file)
         opened.append(program)

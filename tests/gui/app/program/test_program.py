@@ -33,7 +33,7 @@ from handcal.session.session import Session, SessionRecord
 from handcal.station.station import Station
 from handcal_gui.app.preferences import PREFERENCES_VERSION, PreferencesFile
 from handcal_gui.calibrate.control.conditions import Conditions
-from handcal_gui.calibrate.guide.view import Action
+from handcal_gui.calibrate.guide.view import Action, Step
 from handcal_gui.widgets.path_field import PathField
 from tests.gui.app.program.technician import (
     PATIENCE_MS,
@@ -320,6 +320,45 @@ def test_nothing_is_lost_by_closing_at_work(
     second.wait_for_page("live")
     assert second.snapshot.procedure.state is resumed
     assert len(second.snapshot.record.alignments) == 1
+
+
+@pytest.mark.parametrize("why", ["taken off", "hours later"])
+def test_a_headset_that_was_off_is_verified_first_and_nothing_is_fused(
+    live: Technician, studio: Any, monkeypatch: pytest.MonkeyPatch, why: str
+) -> None:
+    align(live, studio)
+    solve_and_apply(live)
+    before = live.snapshot
+    live.program.live.next_wearer_requested.emit()
+    live.wait_for_page("start")
+    if why == "taken off":
+        monkeypatch.setattr("handcal_gui.app.program.ask_whether_worn", lambda *_: False)
+    else:
+        monkeypatch.setattr("handcal_gui.app.program.may_still_be_worn", lambda *_: False)
+        monkeypatch.setattr("handcal_gui.app.program.ask_whether_worn", pytest.fail)
+    live.program.resume_session(before.session_path)
+    live.wait_for_page("live")
+    record = live.snapshot.record
+    assert record.path != before.session_path
+    assert record.facts.former == before.session_path.name
+    assert (record.alignments, record.verified_now) == ({}, frozenset())
+    for eye, shift_m in before.procedure.applied_shift_m.items():
+        np.testing.assert_allclose(live.snapshot.procedure.applied_shift_m[eye], shift_m)
+    live.press_space_for(Action.NEXT)
+    live.wait(lambda: live.program.wizard_panel.shown.step is Step.VERIFY)
+    assert Session.open(before.session_path).is_finished
+
+
+def test_resuming_can_be_thought_better_of(
+    live: Technician, studio: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    align(live, studio)
+    path = live.snapshot.session_path
+    live.program.show_start()
+    monkeypatch.setattr("handcal_gui.app.program.ask_whether_worn", lambda *_: None)
+    live.program.resume_session(path)
+    assert live.program.window.page == "start"
+    assert live.program.live.snapshot is None
 
 
 @pytest.mark.parametrize("answer", ["No", "Yes"])

@@ -34,13 +34,12 @@ from handcal_gui.app.program import Program
 from handcal_gui.calibrate.control import review
 from handcal_gui.calibrate.control.review import _Stored
 from handcal_gui.calibrate.parts.legend import LegendEntry
-from handcal_gui.calibrate.results.verdict_card import VerdictCard
 from handcal_gui.calibrate.review_page import ReviewPage
 from handcal_gui.calibrate.start.example import copy_example
 from handcal_gui.connect.openxr_dialog import OpenxrDialog
 from handcal_gui.library.window import LibraryWindow
-from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.path_field import PathField
+from handcal_gui.widgets.table import Table
 from tests.gui.views import VERIFIED
 
 PATIENCE_MS = 20_000
@@ -146,7 +145,7 @@ def test_the_example_is_opened_from_the_start_page(
     program.start.example_requested.emit(tmp_path / "sessions")
     qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
     assert child(program, QLabel, "reviewContents").text().startswith("2 alignments, 6 trials")
-    numbers = child(program, NumberTable, "numbers-of-both-eyes").as_text()
+    numbers = child(program, Table, "numbers-of-both-eyes").as_text()
     assert "Trials\t2.4′ n=3\t7.5′ n=3" in numbers
     assert program.window.findChild(QLabel, "reviewNote") is None
     program.show_start()
@@ -166,10 +165,10 @@ def test_other_results_than_those_of_solving_again_are_named(
         session.save_results(stored)
     program.open_session(path)
     qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
-    numbers = child(program, NumberTable, "numbers-of-both-eyes").as_text()
+    numbers = child(program, Table, "numbers-of-both-eyes").as_text()
     assert "Trials\t2.4′ n=3\t7.5′ n=3" in numbers
     assert child(program, QLabel, "reviewNote").text() == (
-        "Solved again by this version; when it was recorded, the verdict was left eye ↻ Repeat."
+        "Solved again by this version; when it was recorded, the verdict was left eye ↻ Not yet."
     )
 
 
@@ -198,9 +197,6 @@ def test_a_session_is_shown_and_closed_again(
     card = child(program, ReviewPage, "reviewPage").findChild(QLabel, "card-verdict-left")
     assert isinstance(card, QLabel)
     assert card.text().startswith("Left eye: ")
-    cards = program.window.panels.results.findChildren(VerdictCard)
-    assert cards
-    assert all(one.isHidden() for one in cards), "the page says it"
     assert program.preferences.sessions == (str(record.path),)
     child(program, QPushButton, "reviewClose").click()
     assert program.window.page == "start"
@@ -370,12 +366,13 @@ def test_a_session_that_was_only_verified_is_shown_compared_and_exported(
     assert child(program, ReviewPage, "reviewPage").residuals.isHidden()
     tabs = child(program, QTabWidget, "results-tabs")
     shown = [tabs.tabText(i) for i in range(tabs.count()) if tabs.isTabVisible(i)]
-    assert shown == ["Eyes", "Plots", "Compare"]
+    assert shown == ["Eyes", "Plots", "Other method"]
     assert child(program, QPushButton, "reviewExport").isEnabled()
     assert program.windows.export() is not None
     child(program, QPushButton, "reviewOpenxr").click()
     assert len(program.window.findChildren(OpenxrDialog)) == 1
-    program.window.panels.results.compare_requested.emit("linear")
+    child(program, QComboBox, "comparison-method").setCurrentText("linear")
+    child(program, QPushButton, "comparison-start").click()
     status = child(program, QLabel, "comparison-status")
     qtbot.waitUntil(lambda: status.text().startswith("Δ"), timeout=PATIENCE_MS)
 
@@ -391,7 +388,8 @@ def test_a_comparison_is_shown_or_cancelled(
     shares: list[float] = []
     bar = child(program, QProgressBar, "comparison-progress")
     bar.valueChanged.connect(lambda value: shares.append(value / bar.maximum()))
-    program.window.panels.results.compare_requested.emit("linear")
+    child(program, QComboBox, "comparison-method").setCurrentText("linear")
+    start.click()
     qtbot.waitUntil(lambda: status.text().startswith("Δ"), timeout=PATIENCE_MS)
     assert 0.5 in shares  # one of two alignments
 
@@ -413,6 +411,6 @@ def test_it_can_be_compared_and_closed_at_once(
     qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
     solver = Solver()
     monkeypatch.setattr("handcal.calibration.solve_again.solve_session", solver)
-    program.window.panels.results.compare_requested.emit("paper")
+    child(program, QPushButton, "comparison-start").click()
     program.window.close()
     assert solver.was_cancelled.is_set()

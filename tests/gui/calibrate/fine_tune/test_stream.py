@@ -10,8 +10,14 @@ from pytestqt.qtbot import QtBot
 from handcal.calibration.states import State
 from handcal.core.types import EYES
 from handcal.station.snapshot import Snapshot
-from handcal_gui.calibrate.fine_tune.history import Shifts, same_shifts
-from handcal_gui.calibrate.fine_tune.stream import PERIOD_MS, SETTLE_MS, Arrival, ShiftStream
+from handcal_gui.calibrate.fine_tune.stream import (
+    PERIOD_MS,
+    SETTLE_MS,
+    Arrival,
+    Shifts,
+    ShiftStream,
+    is_same_shifts,
+)
 
 MakeSnapshot = Callable[..., Snapshot]
 
@@ -52,7 +58,7 @@ def test_many_changes_are_sent_as_few(qtbot: QtBot, stream: ShiftStream) -> None
     periods = (time.monotonic() - started_s) / (1e-3 * PERIOD_MS)
     # One at the start, one for each period, and the last one by `flush`.
     assert 1 < len(sent) <= periods + 2
-    assert same_shifts(sent[-1], shifts_of(1e-5 * 199))
+    assert is_same_shifts(sent[-1], shifts_of(1e-5 * 199))
 
 
 def test_settles_once_after_the_last_change(qtbot: QtBot, stream: ShiftStream) -> None:

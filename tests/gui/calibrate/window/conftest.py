@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QPushButton
+from PySide6.QtWidgets import QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal.station.snapshot import Snapshot
@@ -21,18 +21,7 @@ from handcal_gui.calibrate.window import MainWindow
 
 
 @pytest.fixture
-def text_scale(qapp: QApplication, request: pytest.FixtureRequest) -> Iterator[float]:
-    """Scale the font of the test's windows by an indirect parameter."""
-    was, scaled = qapp.font(), qapp.font()
-    scale: float = getattr(request, "param", 1.0)
-    scaled.setPointSizeF(scale * was.pointSizeF())
-    qapp.setFont(scaled)
-    yield scale
-    qapp.setFont(was)
-
-
-@pytest.fixture
-def program(qtbot: QtBot, tmp_path: Path, text_scale: float) -> Iterator[Program]:
+def program(qtbot: QtBot, tmp_path: Path) -> Iterator[Program]:
     program = Program(PreferencesFile(tmp_path / "preferences.json"))
     qtbot.addWidget(program.window)
     program.window.resize(1280, 800)
@@ -82,12 +71,3 @@ def press(window: MainWindow, key: Qt.Key, modifiers: Qt.KeyboardModifier = _NON
     # A press in the same millisecond as the last release repeats a key that is held down.
     QTest.qSleep(2)
     QTest.keyClick(window.windowHandle(), key, modifiers)
-
-
-def shown(window: MainWindow) -> set[str]:
-    """Return the names of the docks that are shown."""
-    return {name for name, dock in window.docks.items() if not dock.isHidden()}
-
-
-def is_in_front(window: MainWindow, name: str) -> bool:
-    return not window.docks[name].visibleRegion().isEmpty()

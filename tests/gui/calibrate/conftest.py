@@ -1,28 +1,35 @@
+"""An engine that takes the panels' commands, for all tests of panels."""
+
 from __future__ import annotations
 
-import itertools
+from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
-from pytestqt.qtbot import QtBot
 
 from handcal.core.types import Eye, Rig
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
-from handcal_gui.calibrate.trials.panel import TrialsPanel
-from tests.gui.helpers import show
+from handcal_gui.engine.engine_thread import Command
 
 
-@pytest.fixture(autouse=True)
-def presses_apart(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let each press come two seconds after the one before."""
-    times_s = itertools.count(0.0, 2.0)
-    monkeypatch.setattr("handcal_gui.calibrate.trials.panel.monotonic", lambda: next(times_s))
+class Engine:
+    """Obeys commands at once, with a station that notes the calls."""
+
+    def __init__(self) -> None:
+        self.station: Any = MagicMock()
+        self.names: list[str] = []
+
+    def __call__(self, name: str, command: Command) -> int:
+        command(self.station)
+        self.names.append(name)
+        return len(self.names)
 
 
 @pytest.fixture
-def panel(qtbot: QtBot) -> TrialsPanel:
-    return show(qtbot, TrialsPanel(), 430, 450)
+def engine() -> Engine:
+    return Engine()
 
 
 @pytest.fixture
