@@ -191,7 +191,7 @@ class ImagesPanel(QWidget):
         self.shots = shots
         self._trouble.hide()
         self._view.show_shot(None)
-        self._list.show_shots(shots, dropped)
+        self._list.show_shots(shots, dropped, tr("another board") if other else "")
         self._refresh()
         self.dropped_changed.emit()
         if self._question is not None and not all(shot.problem for shot in shots):
@@ -310,13 +310,15 @@ class ShotList(QTreeWidget):
             shot.name for item, shot in self._rows() if item.checkState(_IMAGE) is unchecked
         )
 
-    def show_shots(self, shots: Sequence[Shot], dropped: Iterable[str]) -> None:
-        """Replace the list."""
+    def show_shots(self, shots: Sequence[Shot], dropped: Iterable[str], note: str = "") -> None:
+        """Replace the list; a note stands in place of each problem if it explains all of them."""
         out = frozenset(dropped)
         self._shots = tuple(shots)
         self.blockSignals(True)
         self.clear()
-        self.addTopLevelItems([_item(shot, shot.name in out) for shot in shots])
+        self.addTopLevelItems(
+            [_item(shot, shot.name in out, note or shot.problem) for shot in shots]
+        )
         self._mark_all()
         self.blockSignals(False)
         if (first := self.topLevelItem(0)) is not None:
@@ -357,7 +359,7 @@ class ShotList(QTreeWidget):
         return [(item, shot) for item, shot in zip(items, self._shots, strict=False) if item]
 
 
-def _item(shot: Shot, is_dropped: bool) -> QTreeWidgetItem:
+def _item(shot: Shot, is_dropped: bool, note: str) -> QTreeWidgetItem:
     counts = (str(len(view.found.ids)) if view.found else UNKNOWN for view in shot.views)
     item = QTreeWidgetItem([shot.name, " · ".join(counts), UNKNOWN, UNKNOWN])
     checked = Qt.CheckState.Unchecked if is_dropped else Qt.CheckState.Checked
@@ -368,7 +370,7 @@ def _item(shot: Shot, is_dropped: bool) -> QTreeWidgetItem:
     for column in (_CORNERS, _OFF, _TILT):
         item.setTextAlignment(column, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         item.setFont(column, number_font())
-    _note(item, shot.problem)
+    _note(item, note)
     return item
 
 

@@ -180,7 +180,6 @@ class ResultPage(QWidget):
             expected = "" if one.is_fine else one.expected
             items = [QTableWidgetItem(sentence(text)) for text in (one.what, found, expected)]
             for column, item in enumerate(items):
-                item.setTextAlignment(Qt.AlignmentFlag.AlignTop)
                 table.setItem(row, column, item)
             sign, shade, word = _sign(one)
             items[0].setIcon(icon(sign, getattr(colors(), shade)) if sign else QIcon())

@@ -151,6 +151,7 @@ def test_another_board_in_the_images_is_named_once_and_taken_by_a_button(
     offer = child(panel.search, QPushButton, "imagesFix")
     qtbot.waitUntil(lambda: not panel.bar.is_busy, timeout=20_000)
     assert panel.used == 0
+    assert {item(panel, row).text(4) for row in range(8)} == {"Another board"}, "said once, below"
     assert ("10 × 7" in text(panel.search, "imagesFound")) == (entered.squares == (10, 7))
     offer.click()
     qtbot.waitUntil(lambda: not panel.bar.is_busy, timeout=20_000)
