@@ -20,7 +20,7 @@ from handcal.core.types import UInt8
 from handcal.io.files import user_path
 from handcal.lab.evaluate.cube_capture import RestWatch, instruction, keep_capture
 from handcal.lab.evaluate.cube_folder import GRID, CapturePlan, PlannedCapture, missing_captures
-from handcal.lab.evaluate.run import cube_and_grid, position_warp
+from handcal.lab.evaluate.cube_test import cube_and_grid, position_warp
 from handcal.rig.cube.cube import Cube
 from handcal.rig.displays.grid import Grid
 from handcal.rig.displays.warp import RotationWarp

@@ -9,9 +9,10 @@ from PySide6.QtWidgets import QLineEdit, QSpinBox, QWidget
 
 from handcal.io.files import user_path
 from handcal.lab.evaluate.cube_folder import find_captures
+from handcal.lab.evaluate.cube_test import run_cube_test
 from handcal.lab.evaluate.masked_frames import read_masked_names
-from handcal.lab.evaluate.run import run_cube_test, run_segmentation_test, run_user_test
-from handcal.lab.evaluate.user_test import holds_trials
+from handcal.lab.evaluate.segmentation import run_segmentation_test
+from handcal.lab.evaluate.user_test import holds_trials, run_user_test
 from handcal.lab.settings import SegmentationTestSettings
 from handcal.lab.study.studies import (
     method_cases,

@@ -11,7 +11,7 @@ import pytest
 
 from handcal.core.errors import CancelledError, FileError
 from handcal.core.progress import Progress
-from handcal.lab.evaluate.run import UserTestRun
+from handcal.lab.evaluate.user_test import UserTestRun
 from handcal.lab.settings import NoiseStudySettings
 from handcal.lab.study.run import run_study
 from handcal.report.document import Report
