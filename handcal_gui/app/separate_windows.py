@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from datetime import datetime
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,7 +15,7 @@ from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QWidget
 
 from handcal.core.errors import FileError, HandcalError
 from handcal.core.progress import Progress
-from handcal.export.export import ExportSettings, export_session
+from handcal.export.export import ExportSettings, export_name, export_session
 from handcal.export.many import Exported, export_sessions
 from handcal.link.server import HeadsetServer
 from handcal.rig.rig_file import read_rig
@@ -129,7 +130,7 @@ class SeparateWindows(QObject):
         def export(target: Path, settings: ExportSettings, progress: Progress) -> Exported:
             return Exported(export_session(record, target, settings, progress))
 
-        name, wearer = record.path.absolute().name, record.wearer
+        name, wearer = export_name(record), record.wearer
         folder = folder or self._export_folder(record.path.parent)
         return self._open_export(name, folder, export, wearer, self._window)
 
@@ -163,14 +164,15 @@ class SeparateWindows(QObject):
         return window
 
     def export_many(self, paths: Sequence[Path], parent: QWidget) -> ExportDialog:
-        """Open the export dialog for several sessions, each to a folder of its own."""
+        """Open the export dialog for several sessions: each alone, and all together."""
 
         def export(target: Path, settings: ExportSettings, progress: Progress) -> Exported:
             return export_sessions(paths, target, settings, progress)
 
-        name = pluralize(len(paths), tr("session"), tr("sessions"))
+        title = pluralize(len(paths), tr("session"), tr("sessions"))
+        name = f"{datetime.now():%Y-%m-%d}-{len(paths)}-sessions"
         folder = self._export_folder(paths[0].parent)
-        return self._open_export(name, folder, export, "", parent)
+        return self._open_export(name, folder, export, title, parent)
 
     def inspect(self) -> None:
         """Show the alignments of the session shown in a 3D window."""

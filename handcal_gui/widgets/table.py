@@ -30,6 +30,7 @@ _NO_INDEX = QModelIndex()
 _MOST_PX = 300
 """Width of a column at most; a longer text is cut, and whole in the tooltip."""
 _LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+_CENTRE = Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignVCenter
 _RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 
 
@@ -41,7 +42,7 @@ class Column:
     tooltip: str = ""
     is_number: bool = True
     rank: int = 0
-    """Where not all columns fit, those of the highest rank are left out first, down to 1."""
+    """Columns of the highest rank are left out first if not all fit; those of rank 0 never."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +50,7 @@ class Row:
     """A row of a table."""
 
     label: str
-    """Stands before the cells; where no row has one, there is no column for it."""
+    """Stands before the cells; there is no column for it if no row has one."""
     cells: tuple[str, ...]
     """If cells are missing, the last one spans the rest."""
     tooltip: str = ""
@@ -124,8 +125,15 @@ class _Model(QAbstractTableModel):
             case Qt.ItemDataRole.FontRole if column.is_number:
                 return self._font
             case Qt.ItemDataRole.TextAlignmentRole:
-                return _RIGHT if column.is_number else _LEFT
+                return self._alignment(place)
         return None
+
+    def _alignment(self, place: int) -> Qt.AlignmentFlag:
+        if not self.columns[place].is_number:
+            return _LEFT
+        # On the right, a number would run into the text of the next column.
+        is_before_text = not all(one.is_number for one in self.columns[place + 1 : place + 2])
+        return _CENTRE if is_before_text else _RIGHT
 
     def headerData(
         self,
@@ -139,7 +147,7 @@ class _Model(QAbstractTableModel):
         texts = {
             Qt.ItemDataRole.DisplayRole: column.title,
             Qt.ItemDataRole.ToolTipRole: column.tooltip,
-            Qt.ItemDataRole.TextAlignmentRole: _RIGHT if column.is_number else _LEFT,
+            Qt.ItemDataRole.TextAlignmentRole: self._alignment(section),
         }
         return texts.get(Qt.ItemDataRole(role))
 

@@ -54,7 +54,7 @@ def test_a_demonstration_calibrates_exports_and_takes_pictures(
     assert (codes, shown.complaint) == ([0], None)
     [path] = (tmp_path / "result").glob("session-*[!t]")
     assert Session.open(path).is_finished
-    [report] = (tmp_path / "result").glob("*-export/report.pdf")
+    [report] = (tmp_path / "result").glob("*/report.pdf")
     assert report.read_bytes().startswith(b"%PDF")
     names = {path.stem for path in (tmp_path / "pictures").glob("*.png")}
     assert {f"step-{i}" for i in range(1, 8)} <= {name[:6] for name in names}

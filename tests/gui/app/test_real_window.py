@@ -372,7 +372,7 @@ def test_the_autopilot_calibrates_exports_and_takes_pictures(
         *("--screenshots", pictures, "--preferences", preferences),
     ) as window:
         window.end_well()
-    assert len(list((tmp_path / "result").glob("*-export/report.pdf"))) == 1
+    assert len(list((tmp_path / "result").glob("*/report.pdf"))) == 1
     names = {path.stem for path in pictures.glob("*.png")}
     assert {f"step-{i}" for i in range(1, 8)} <= {name[:6] for name in names}
     assert {"panel-camera", "panel-results", "panel-fine-tune", "panel-session"} <= names

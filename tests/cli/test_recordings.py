@@ -1,18 +1,21 @@
-"""Replaying frames and recordings."""
+"""Replaying recordings, and the files of a segmented hand."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handcal.cli.replay import replay
-from handcal.core.errors import CameraEndError, CameraTimeoutError
+from handcal.cli.recordings import draw_overlay, replayed, write_segmentation
+from handcal.core.errors import CameraEndError
 from handcal.core.geometry import rigid
-from handcal.core.types import CameraIdentity, Float64, Frame, Intrinsics
+from handcal.core.types import CameraIdentity, Float64, Frame, HandCloud, Intrinsics
 from handcal.hand.segment import SegmentSettings
 from handcal.io.closable import Closable
 from handcal.sim.hand import HandModel, make_hand
@@ -44,13 +47,6 @@ class FrameList(Closable):
         pass
 
 
-class DeadCamera(FrameList):
-    """A camera that never delivers."""
-
-    def read(self, timeout_s: float = 1.0) -> Frame:
-        raise CameraTimeoutError("no frame")
-
-
 @pytest.fixture(scope="module")
 def hand() -> HandModel:
     return make_hand(3)
@@ -72,7 +68,7 @@ def test_motion_of_the_hand_is_reported_across_frames_without_one(hand: HandMode
     turned = T_0.copy()
     turned[:3, :3] = Rotation.from_rotvec(TURN_RAD).as_matrix() @ T_0[:3, :3]
     turned[:3, 3] += SHIFT_M
-    steps = list(replay(FrameList([first, empty, look_at(hand, turned, 3)]), SegmentSettings()))
+    steps = list(replayed(FrameList([first, empty, look_at(hand, turned, 3)]), SegmentSettings()))
     assert [step.frame.index for step in steps] == [1, 2, 3]
     assert [step.hand is None for step in steps] == [False, True, False]
     assert [step.problem.startswith("no hand-sized") for step in steps] == [False, True, False]
@@ -87,11 +83,66 @@ def test_motion_of_the_hand_is_reported_across_frames_without_one(hand: HandMode
 
 def test_a_hand_wholly_beside_cut_edges_does_not_end_the_replay(hand: HandModel) -> None:
     frames = [look_at(hand, T_0, index) for index in (1, 2)]
-    steps = list(replay(FrameList(frames), SegmentSettings(cut_band_m=0.3)))
+    steps = list(replayed(FrameList(frames), SegmentSettings(cut_band_m=0.3)))
     assert [step.hand for step in steps] == [None, None]
     assert all("beside cut edges" in step.problem for step in steps)
 
 
-def test_failing_camera_is_not_taken_for_the_end() -> None:
-    with pytest.raises(CameraTimeoutError):
-        list(replay(DeadCamera([]), SegmentSettings()))
+SMALL_CAMERA = Intrinsics(40, 30, 50.0, 50.0, 20.0, 15.0)
+
+
+def make_frame(T_C_D: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> Frame:
+    depth = np.full((30, 40), 500, np.uint16)
+    color = np.full((30, 40, 3), (100, 0, 0), np.uint8)
+    return Frame(0, 0, 0, depth, 0.001, SMALL_CAMERA, color, SMALL_CAMERA, T_C_D)
+
+
+@pytest.fixture
+def cloud() -> HandCloud:
+    mask = np.zeros((30, 40), np.uint8)
+    mask[10:20, 12:24] = 255
+    corners = np.array([[12, 10], [23, 10], [23, 19], [12, 19]])
+    contour_m = np.column_stack([(corners - (20.0, 15.0)) / 50.0 * 0.5, np.full(4, 0.5)])
+    return HandCloud(
+        t_camera_ns=0,
+        t_host_ns=0,
+        points_m=np.array([[0.1, 0.2, 0.5], [0.0, 0.0, 0.25]], np.float32),
+        is_cut=np.array([False, True]),
+        colors=np.array([[1, 2, 3], [4, 5, 6]], np.uint8),
+        contour_m=contour_m.astype(np.float32),
+        contour_is_cut=np.array([False, False, True, True]),
+        mask=mask,
+        box_px=(12, 10, 24, 20),
+        median_depth_m=0.375,
+    )
+
+
+def test_files_hold_the_hand(cloud: HandCloud, tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "out"
+    write_segmentation(cloud, make_frame(np.eye(4)), folder)
+    assert {file.name for file in folder.iterdir()} == {
+        "hand.ply",
+        "contour.ply",
+        "mask.png",
+        "overlay.png",
+        "hand.json",
+    }
+    assert json.loads((folder / "hand.json").read_text()) == {
+        "box": [12, 10, 24, 20],
+        "points": 2,
+        "contour_points": 4,
+        "median_depth_m": 0.375,
+    }
+    mask = cv2.imread(str(folder / "mask.png"), cv2.IMREAD_UNCHANGED)
+    np.testing.assert_array_equal(mask, cloud.mask)
+    header, _, body = (folder / "hand.ply").read_bytes().partition(b"end_header\n")
+    assert b"element vertex 2" in header
+    np.testing.assert_array_equal(np.frombuffer(body[:12], "<f4"), cloud.points_m[0])
+    assert body[12:15] == bytes([1, 2, 3])
+    overlay = cv2.imread(str(folder / "overlay.png"), cv2.IMREAD_COLOR_RGB)
+    np.testing.assert_array_equal(overlay, draw_overlay(cloud, make_frame(np.eye(4))))
+
+
+def test_unaligned_color_is_not_drawn_under_the_depth_mask(cloud: HandCloud) -> None:
+    picture = draw_overlay(cloud, make_frame(rigid(translation_m=[0.02, 0.0, 0.0])))
+    np.testing.assert_array_equal(picture[0, 0], (127, 127, 127))
