@@ -273,7 +273,7 @@ def test_an_interrupted_session_is_offered_and_resumed(
 
     second = open_program()
     second.wait(second.child(QWidget, "resume").isVisible)
-    second.program.start.resume_requested.emit(path)
+    second.program.start.unfinished.chosen.emit(path)
     second.wait_for_page("live")
     assert second.snapshot.session_path == path
     assert second.snapshot.procedure.state is State.ALIGNED
@@ -329,7 +329,7 @@ def test_a_headset_that_was_off_is_verified_first_and_nothing_is_fused(
     align(live, studio)
     solve_and_apply(live)
     before = live.snapshot
-    live.program.live.next_wearer_requested.emit()
+    live.program.live.do(Action.NEXT_WEARER)
     live.wait_for_page("start")
     if why == "taken off":
         monkeypatch.setattr("handcal_gui.app.program.ask_whether_worn", lambda *_: False)
@@ -389,7 +389,7 @@ def test_a_session_resumed_at_once_is_fine_tuned_from_its_phi(
     if compares:
         panels.trials.compare_requested.emit()
         live.wait(lambda: live.snapshot.comparing is not None)
-    live.program.live.next_wearer_requested.emit()
+    live.program.live.do(Action.NEXT_WEARER)
     live.wait_for_page("start")
     live.program.resume_session(path)
     live.wait_for_page("live")
