@@ -18,8 +18,7 @@ from handcal.session.session import SessionRecord
 from handcal.session.state import SessionEvent, SessionState
 from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
-from handcal_gui.calibrate.guide.step_views import save_view
-from handcal_gui.calibrate.guide.steps import Wizard
+from handcal_gui.calibrate.guide.steps import Wizard, save_view
 from handcal_gui.calibrate.guide.view import Action, Step, WizardView
 
 RECOMMENDED = PlanSettings("recommended", is_automatic=True)

@@ -18,9 +18,7 @@ from handcal.register.results import results_json
 from handcal.register.verdict_words import VERDICT_WORDS
 from handcal.session.session import SessionRecord
 from handcal.station.snapshot import Snapshot
-from handcal_gui.calibrate.guide.preconditions import hand_found
-from handcal_gui.calibrate.guide.step_views import connect_view, distance, save_view
-from handcal_gui.calibrate.guide.steps import Wizard
+from handcal_gui.calibrate.guide.steps import Wizard, connect_view, distance, hand_found, save_view
 from handcal_gui.calibrate.guide.view import Action, ButtonSpec, Precondition, Step
 from tests.gui.views import (
     NUDGED,
