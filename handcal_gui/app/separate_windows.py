@@ -232,10 +232,10 @@ class SeparateWindows(QObject):
         entries, proposed = self._current.now.evaluation, self._current.now.station.sessions
         if not entries.users.sessions:
             entries = replace(entries, users=replace(entries.users, sessions=proposed))
-        window = EvaluationWindow(make_specs(), entries, self._window)
+        read = partial(read_manual, self._window)
+        window = EvaluationWindow(make_specs(), entries, self._window, read)
         window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         window.remembered.connect(partial(self._remember_evaluation, proposed))
-        window.manual_wanted.connect(partial(read_manual, self._window))
         self._ending.connect(window.stop)
         window.show()
         return window
