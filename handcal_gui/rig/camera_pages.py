@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 
 from PySide6.QtWidgets import QWidget
@@ -76,30 +75,21 @@ class StereoPage(StepPage):
                 "depth_to_color": (tr("Pose &from depth to colour"), pose),
             }
         )
-        form.show_entries(project.inputs.stereo)
         panel = ImagesPanel(
-            project, (tr("Depth camera"), tr("Headset camera")), _STEREO_HINT, "setup-stereo"
+            project,
+            (tr("Depth camera"), tr("Headset camera")),
+            _STEREO_HINT,
+            "setup-stereo",
+            ("depth_images", "headset_images"),
         )
         super().__init__("stereoPage", "T_H_D", project, form, {tr("&Pairs"): panel}, parent)
         self.panel = panel
         self.panel.take.clicked.connect(self._take)
         self.show_known()
 
-    def enter(self) -> None:
-        """Search the folders for the board, unless already done."""
-        entries = self.project.inputs.stereo
-        folders = entries.depth_images, entries.headset_images
-        self.panel.look(folders, self.project.inputs.board, entries.dropped)
-
-    def keep(self) -> None:
-        """Store the entries, and search new folders for the board."""
-        entries = self.form.take(self.project.inputs.stereo)
-        self.project.enter(stereo=replace(entries, dropped=self.panel.dropped_of(entries.dropped)))
-        self.enter()
-
     def solve(self) -> None:
         """Solve from the pairs that are not excluded."""
-        work = partial(solve_stereo, self.panel.shots, self.project.inputs.stereo)
+        work = partial(solve_stereo, self.panel.shots, self.entries)
         self.box.run(work, self._show_solved)
 
     @property
@@ -155,8 +145,9 @@ class ViewpointPage(StepPage):
                 "intrinsics": (tr("Its in&trinsics"), given),
             }
         )
-        form.show_entries(project.inputs.viewpoint)
-        panel = ImagesPanel(project, (tr("Viewpoint camera"),), _VIEWPOINT_HINT, "setup-viewpoint")
+        panel = ImagesPanel(
+            project, (tr("Viewpoint camera"),), _VIEWPOINT_HINT, "setup-viewpoint", ("images",)
+        )
         super().__init__(
             "viewpointPage", "viewpoint", project, form, {tr("I&mages"): panel}, parent
         )
@@ -164,21 +155,9 @@ class ViewpointPage(StepPage):
         self.panel.take.clicked.connect(self._take)
         self.show_known()
 
-    def enter(self) -> None:
-        """Search the folder for the board, unless already done."""
-        entries = self.project.inputs.viewpoint
-        self.panel.look((entries.images,), self.project.inputs.board, entries.dropped)
-
-    def keep(self) -> None:
-        """Store the entries, and search a new folder for the board."""
-        entries = self.form.take(self.project.inputs.viewpoint)
-        dropped = self.panel.dropped_of(entries.dropped)
-        self.project.enter(viewpoint=replace(entries, dropped=dropped))
-        self.enter()
-
     def solve(self) -> None:
         """Solve from the images that are not excluded."""
-        entries, output = self.project.inputs.viewpoint, self.project.folder.viewpoint
+        entries, output = self.entries, self.project.folder.viewpoint
         self.box.run(partial(solve_viewpoint, self.panel.shots, entries, output), self._show_solved)
 
     def show_known(self) -> None:

@@ -56,6 +56,9 @@ class ImagesPanel(QWidget):
         How to take the images.
     drawing : str
         Name of the drawing of the arrangement in the tutorial.
+    folders : sequence of str
+    dropped : str
+        Fields of the step's entries: folders of the images, and the excluded ones.
     take, again : str
         Texts of the buttons, so that two panels of a page can have different keys.
 
@@ -63,6 +66,8 @@ class ImagesPanel(QWidget):
     ----------
     hint, drawing, buttons, search : QWidget
         How to take the images, and how their search goes on; the page places them.
+    folders, dropped
+        As given.
     take, again : QPushButton
         Connected by the page; once `again` is pressed, `look` reads the folders again.
     shots : tuple of Shot
@@ -78,12 +83,15 @@ class ImagesPanel(QWidget):
         titles: tuple[str, ...],
         hint: str,
         drawing: str,
+        folders: Sequence[str] = (),
+        dropped: str = "dropped",
         take: str = tr("&Take images…"),
         again: str = tr("Find the board &again"),
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
         self._project = project
+        self.folders, self.dropped = tuple(folders), dropped
         self.buttons, self.search = QWidget(), QWidget()
         self.shots: tuple[Shot, ...] = ()
         self._question: tuple[tuple[Path, ...], Board] | None = None
