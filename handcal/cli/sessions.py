@@ -123,8 +123,8 @@ def export(arguments: argparse.Namespace) -> None:
         with show_progress() as progress:
             made = export_sessions(arguments.session, folder, settings, progress)
         for file in made.files:
-            console.print(str(file), markup=False)
-        console.print(made.sentence, markup=False)
+            console.print(str(file))
+        console.print(made.sentence)
         if made.missing:
             fail(f"not exported: {', '.join(made.missing)}", 1)
         return

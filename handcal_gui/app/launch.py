@@ -24,14 +24,15 @@ from handcal.core.errors import HandcalError
 from handcal.io.files import make_folder
 from handcal.io.resources import resource_path
 from handcal.station.settings import StationSettings, with_source
-from handcal_gui.app.autopilot.demonstration import Demonstration
+from handcal_gui.app.autopilot import Demonstration
 from handcal_gui.app.preferences import PreferencesFile
 from handcal_gui.app.program import Program
 from handcal_gui.app.translation import tr
 from handcal_gui.engine.garbage import collect_in_this_thread
-from handcal_gui.widgets.placement import show_on_screen
 
 _LOG_BYTES = 2**20
+_TITLE_PX = 40
+"""Height of a title bar and the edges, which a window manager adds only later."""
 
 
 class LaunchError(Exception):
@@ -72,8 +73,10 @@ def launch(app: QApplication, arguments: argparse.Namespace, first: QWidget) -> 
         program.window.setWindowState(Qt.WindowState.WindowNoState)  # it was maximized when closed
         program.window.resize(arguments.size)
         program.window.show()
+    elif program.window.height() < program.window.screen().availableSize().height() - _TITLE_PX:
+        program.window.show()
     else:
-        show_on_screen(program.window)
+        program.window.showMaximized()
     first.close()
     try:
         demonstration = _begin(program, arguments)

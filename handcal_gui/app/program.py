@@ -89,7 +89,13 @@ class Program(QObject):
         self.live = CalibrationController(self.window, self.wizard_panel)
         self.review = ReviewController(self.window, review_page)
         self.windows = SeparateWindows(
-            self.window, self.start, self.live, self.review, self._current
+            self.window,
+            self.start,
+            self.live,
+            self.review,
+            self._current,
+            self.open_session,
+            self.resume_session,
         )
         self._connect(review_page)
         self._make_menus()
@@ -202,17 +208,15 @@ class Program(QObject):
         self.start.stop()
 
     def _connect(self, review_page: ReviewPage) -> None:
-        self.start.start_requested.connect(self.start_calibration)
-        self.start.cancel_requested.connect(self.live.cancel)
-        self.start.resume_requested.connect(self.resume_session)
-        self.start.open_requested.connect(self.open_session)
+        self.start.new.start_requested.connect(self.start_calibration)
+        self.start.new.cancel_requested.connect(self.live.cancel)
+        self.start.unfinished.chosen.connect(self.resume_session)
+        self.start.recent.chosen.connect(self.open_session)
         self.start.example_requested.connect(self.open_example)
         self.start.library_requested.connect(self.windows.show_library)
-        self.start.rig_wanted.connect(self.windows.calibrate_rig)
-        self.start.connect_wanted.connect(self.windows.connect_headset)
-        self.start.evaluation_wanted.connect(self.windows.evaluate)
-        self.windows.open_requested.connect(self.open_session)
-        self.windows.resume_requested.connect(self.resume_session)
+        self.start.new.form.calibrate_rig.clicked.connect(lambda: self.windows.calibrate_rig())
+        self.start.new.form.connect_headset = self.windows.connect_headset
+        self.start.evaluate.clicked.connect(lambda: self.windows.evaluate())
         self.live.ended.connect(self._on_ended)
         self.live.opened.connect(self._current.add_session)
         self.live.on = {

@@ -52,19 +52,24 @@ class EvaluationPage(QWidget):
     spec : EvaluationSpec
     entries : object
         Dataclass with the initial values.
+    read : callable
+        Shows a page of the manual.
 
     Attributes
     ----------
     busy_changed : Signal(bool)
-    manual_wanted : Signal(str)
-        The user wants to read a page of the manual.
     form : EntriesForm
     """
 
     busy_changed = Signal(bool)
-    manual_wanted = Signal(str)
 
-    def __init__(self, spec: EvaluationSpec, entries: Any, parent: QWidget | None = None) -> None:
+    def __init__(
+        self,
+        spec: EvaluationSpec,
+        entries: Any,
+        read: Callable[[str], object] = lambda _page: None,
+        parent: QWidget | None = None,
+    ) -> None:
         super().__init__(parent)
         self._evaluation = spec.evaluation
         self._question_text = spec.question
@@ -85,7 +90,7 @@ class EvaluationPage(QWidget):
         keep_space(self._found)
         self._results = ResultsView(spec.coming)
         self._look = LatestJob(self._check, self)
-        self._lay_out(spec)
+        self._lay_out(spec, read)
         self.form.changed.connect(self._on_entries_changed)
         self._button.clicked.connect(self.run)
         for prepare in self._preparing:
@@ -230,9 +235,9 @@ class EvaluationPage(QWidget):
             return replace(finding, found=tr("Cancelled; the next run starts from the beginning"))
         return replace(finding, found=tr("Cancelled; {}").format(finding.found))
 
-    def _lay_out(self, spec: EvaluationSpec) -> None:
+    def _lay_out(self, spec: EvaluationSpec, read: Callable[[str], object]) -> None:
         note = make_linked(paragraph("format", spec.note))
-        note.linkActivated.connect(self.manual_wanted)
+        note.linkActivated.connect(read)
         note.setVisible(bool(spec.note))
         vbox(
             self._question,

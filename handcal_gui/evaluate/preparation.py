@@ -10,7 +10,6 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QDialog, QPushButton, QWidget
 
 from handcal_gui.widgets.fields import with_name
-from handcal_gui.widgets.placement import keep_on_screen
 
 
 class PreparationDialog(QDialog):
@@ -85,7 +84,6 @@ class PreparationButton(QPushButton):
         self._dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self._dialog.finished.connect(self._end)
         self._dialog.open()
-        keep_on_screen(self._dialog)
 
     def _end(self) -> None:
         assert self._dialog is not None

@@ -178,14 +178,12 @@ class ResultPage(QWidget):
         for row, one in enumerate(shown):
             found = _TIME.sub(lambda time: local_time(time[0]), one.found)
             expected = "" if one.is_fine else one.expected
-            for column, text in enumerate((one.what, found, expected)):
-                item = QTableWidgetItem(sentence(text))
-                item.setTextAlignment(Qt.AlignmentFlag.AlignTop)
+            items = [QTableWidgetItem(sentence(text)) for text in (one.what, found, expected)]
+            for column, item in enumerate(items):
                 table.setItem(row, column, item)
             sign, shade, word = _sign(one)
-            item = table.item(row, 0)
-            item.setIcon(icon(sign, getattr(colors(), shade)) if sign else QIcon())
-            item.setData(Qt.ItemDataRole.AccessibleDescriptionRole, word)
+            items[0].setIcon(icon(sign, getattr(colors(), shade)) if sign else QIcon())
+            items[0].setData(Qt.ItemDataRole.AccessibleDescriptionRole, word)
         table.setColumnHidden(_EXPECTED, all(one.is_fine for one in shown))
 
     def _outdated(self) -> list[RigFinding]:

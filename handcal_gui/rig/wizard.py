@@ -21,6 +21,7 @@ from handcal.camera.settings import RealSenseSettings
 from handcal_gui.app.theme import SPACING_PX, colors, follow_theme, icon, scale_font
 from handcal_gui.app.translation import tr
 from handcal_gui.rig.board_page import BoardPage
+from handcal_gui.rig.camera_pages import StereoPage, ViewpointPage
 from handcal_gui.rig.display_page import DisplayPage
 from handcal_gui.rig.project import UNREADABLE, RigProject
 from handcal_gui.rig.project_folder import ProjectFolder
@@ -28,8 +29,6 @@ from handcal_gui.rig.result_page import ResultPage
 from handcal_gui.rig.solve_box import SolveBox
 from handcal_gui.rig.step_inputs import STEP_TITLES, Step
 from handcal_gui.rig.step_page import StepPage
-from handcal_gui.rig.stereo_page import StereoPage
-from handcal_gui.rig.viewpoint_page import ViewpointPage
 from handcal_gui.widgets.banner import Banner
 from handcal_gui.widgets.fields import button, paragraph, with_name
 from handcal_gui.widgets.job_bar import may_cancel

@@ -51,7 +51,7 @@ class EntriesForm(QWidget):
         form.setVerticalSpacing(SPACING_PX // 2)
         for text, field in fields.values():
             form.addRow(label_for(field, text), field)
-            _kind_of(field).change(field).connect(self.changed)
+            kind_of(field).change(field).connect(self.changed)
 
     def show_entries(self, entries: object) -> None:
         """Show the fields' values."""
@@ -60,11 +60,11 @@ class EntriesForm(QWidget):
     def enter(self, **values: object) -> None:
         """Show other values of some fields, as if typed."""
         for name, value in values.items():
-            _kind_of(self._fields[name]).show(self._fields[name], value)
+            kind_of(self._fields[name]).show(self._fields[name], value)
 
     def take(self, entries: Entries) -> Entries:
         """Return the entered values."""
-        shown = {name: _kind_of(field).value(field) for name, field in self._fields.items()}
+        shown = {name: kind_of(field).value(field) for name, field in self._fields.items()}
         return cast(Entries, replace(cast(Any, entries), **shown))
 
 
@@ -95,5 +95,6 @@ _KINDS: dict[type[QWidget], _Kind] = {
 }
 
 
-def _kind_of(field: QWidget) -> _Kind:
+def kind_of(field: QWidget) -> _Kind:
+    """Return how a field is read and written."""
     return next(kind for of, kind in _KINDS.items() if isinstance(field, of))

@@ -26,7 +26,15 @@ from handcal.report.statistics import mean_interval
 from handcal.rig.example import example_rig
 from handcal.session.journal import Event
 from handcal.session.session import Session, SessionRecord
-from handcal.session.trial import COMPARED, Answer, Comparison, Drawing, comparison_json, make_trial
+from handcal.session.trial import (
+    COMPARED,
+    Answer,
+    Comparison,
+    Drawing,
+    comparison_json,
+    make_trial,
+    trial_spread,
+)
 
 RIG = example_rig()
 
@@ -78,9 +86,12 @@ def test_sessions_are_read_once_and_others_named(user_test: UserTest, folder: Pa
 def test_errors_are_those_of_the_trials(user_test: UserTest) -> None:
     result = evaluate_user_test(user_test)
     trials = [trial for record in user_test.sessions.values() for trial in record.trials.values()]
-    arcmin = np.concatenate([trial.error_arcmin for trial in trials])
-    assert result.total.arcmin.mean == pytest.approx(arcmin.mean())
-    assert result.total.arcmin.median == pytest.approx(np.median(arcmin))
+    corners = np.concatenate([trial.error_arcmin for trial in trials])
+    assert result.total.corner_arcmin.mean == pytest.approx(corners.mean())
+    assert result.total.corner_arcmin.median == pytest.approx(np.median(corners))
+    means = [trial.error_arcmin.mean() for trial in trials]
+    assert result.total.arcmin.mean == pytest.approx(np.mean(means))
+    assert result.total.arcmin.sd == pytest.approx(np.std(means, ddof=1)), "of trials"
     assert (result.total.calibrations, result.total.trials) == (7, 42)
     assert {name: group.calibrations for name, group in result.by_wearer.items()} == {
         "a": 3,
@@ -91,6 +102,15 @@ def test_errors_are_those_of_the_trials(user_test: UserTest) -> None:
     assert list(result.by_depth_m) == ["0.4", "0.5", "0.6"]
     assert result.components_arcmin is not None
     json.dumps(asdict(result), allow_nan=False)
+
+
+def test_the_spread_of_trials_is_that_of_the_windows_panel(folder: Path) -> None:
+    record = Session.open(folder / "one")
+    shown = trial_spread(record.trials, list(record.trials))
+    found = evaluate_user_test(read_user_test([folder / "one"])).total
+    assert found.arcmin.mean == pytest.approx(shown.mean_arcmin)
+    assert found.arcmin.sd == pytest.approx(shown.trial_sd_arcmin)
+    assert found.trials == shown.trials
 
 
 def test_intervals_are_over_wearers_and_of_one_over_calibrations(user_test: UserTest) -> None:

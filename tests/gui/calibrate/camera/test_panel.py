@@ -15,8 +15,7 @@ from handcal.core.errors import FileError
 from handcal.core.geometry import rigid
 from handcal.hand.settings import SegmentSettings
 from handcal.station.snapshot import Snapshot
-from handcal_gui.calibrate.camera.depth_scale import DepthLegend
-from handcal_gui.calibrate.camera.panel import CameraPanel, Mode
+from handcal_gui.calibrate.camera.panel import CameraPanel, DepthLegend, Mode
 from handcal_gui.widgets.image_view import ImageView
 from tests.gui.conftest import NOW_NS, Shots
 from tests.gui.helpers import child, show, text

@@ -13,8 +13,7 @@ from handcal.calibration.states import CalibrationSettings, State
 from handcal.register.guard import GuardSettings, turn_advice
 from handcal.session.journal import Event
 from handcal.station.snapshot import Snapshot
-from handcal_gui.calibrate.rotation.dial import RotationDial
-from handcal_gui.calibrate.rotation.panel import RotationPanel
+from handcal_gui.calibrate.rotation.panel import RotationDial, RotationPanel
 from handcal_gui.widgets.plots import Plot
 from tests.gui.helpers import child
 
