@@ -415,6 +415,8 @@ class UnfinishedSession:
     """Number of damaged parts, which are left out when it is resumed."""
     problem: str = ""
     """Reason why it cannot be resumed, such as another program; empty if it can."""
+    advice: str = ""
+    """What to do about it, if the reason tells."""
     is_repaired: bool = False
     """True if a repaired copy of this damaged session is in the same folder."""
 
@@ -458,7 +460,7 @@ def _inspect(
         FileLock(path / "lock").release()  # only a test: reading takes too long to hold it
         record = Session.open(path)
     except FileError as error:
-        return UnfinishedSession(path, started, problem=str(error))
+        return UnfinishedSession(path, started, problem=error.what, advice=error.advice)
     return UnfinishedSession(
         path,
         started,

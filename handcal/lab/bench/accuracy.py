@@ -43,10 +43,10 @@ from handcal.rig.displays.homography import (
     calibrate_display,
     fit_homography,
     pixel_size_m,
-    undistort,
 )
 from handcal.rig.example import FOCAL_PX, Z_E_S_M, example_rig
 from handcal.rig.lens.camera import calibrate_camera
+from handcal.rig.lens.lens import undistort
 from handcal.rig.lens.stereo import calibrate_stereo
 from handcal.rig.lens.viewpoint import viewpoint_from_stereo
 from handcal.rig.steps import screen_of, with_display, with_stereo
