@@ -19,7 +19,7 @@ def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[HeadsetServer]:
     monkeypatch.setattr("handcal.link.server._AHEAD_NS", 10**12)
     # Nor are its clocks measured: on a busy machine the drift between them would be, by a percent,
     # and carried on to the stage's times, seconds ahead, a press would be of another frame.
-    clock = "handcal.link.clock.ClockEstimator."
+    clock = "handcal.link.poses.ClockEstimator."
     monkeypatch.setattr(f"{clock}to_headset_ns", lambda _, t_ns: t_ns + HEADSET_AHEAD_NS)
     monkeypatch.setattr(f"{clock}to_host_ns", lambda _, t_ns: t_ns - HEADSET_AHEAD_NS)
     monkeypatch.setattr(f"{clock}_step_ns", lambda *_: 0)

@@ -245,7 +245,7 @@ class TestOnTheRuntime:
         write_wearer(head, np.eye(4))
         monkeypatch.setenv("TEST_HEAD", str(head))
         monkeypatch.setenv("TEST_SIZE_PX", "317")  # Mesa draws slowly
-        monkeypatch.setattr("handcal.sim.process.program_command", lambda: command(head))
+        monkeypatch.setattr("handcal.sim.simulation.program_command", lambda: command(head))
         rig = resource_path("example_rig.yaml")
         result = run_demo(DemoSettings(seed=3), rig, tmp_path / "sessions", Progress())
         error_arcmin = result["reprojection_arcmin"]
