@@ -24,10 +24,11 @@ case "${1:-guide}" in
 guide)
     take "$scratch/pictures" 1280 800 light 1
     mkdir -p docs/pictures
-    for picture in $(grep -o 'pictures/[a-z0-9-]*\.png' docs/guide.md | sort -u); do
+    for picture in $(grep -oh 'pictures/[a-z0-9-]*\.png' docs/guide.md README.md | sort -u); do
         # Open3D's window is not part of the tour; its picture stays.
         if [ -f "$scratch/$picture" ]; then cp "$scratch/$picture" docs/pictures/; fi
     done
+    python docs/moving_picture.py "$scratch/pictures"
     ;;
 looks)
     for theme in light dark; do

@@ -18,7 +18,7 @@ namespace Handcal
     /// </summary>
 #if UNITY_EDITOR
     [OpenXRFeature(
-        UiName = "handcal calibrated views", Company = "handcal", Version = "0.1.0", FeatureId = Id,
+        UiName = "handcal calibrated views", Company = "handcal", Version = "0.2.0", FeatureId = Id,
         Desc = "Draws each eye with its calibration, in every render pipeline and mode.",
         OpenxrExtensionStrings = "XR_KHR_win32_convert_performance_counter_time XR_KHR_convert_timespec_time",
         BuildTargetGroups = new[] { BuildTargetGroup.Standalone, BuildTargetGroup.WSA, BuildTargetGroup.Android })]
