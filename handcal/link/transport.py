@@ -9,8 +9,6 @@ from contextlib import suppress
 from ipaddress import ip_address
 from typing import Any, Protocol, TypeAlias
 
-from ifaddr import get_adapters
-
 from handcal.core.errors import LinkError
 from handcal.link.wire import MAX_DATAGRAM_BYTES
 
@@ -140,6 +138,8 @@ def reachable_address(bound: Address) -> Address:
     LinkError
         If it is bound to all networks, but there is none.
     """
+    from ifaddr import get_adapters  # starts ldconfig when it is imported
+
     host, port = bound
     if host not in EVERY_NETWORK:
         return bound
