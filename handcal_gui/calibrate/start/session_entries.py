@@ -112,7 +112,7 @@ def _unreadable(path: Path, why: str, advice: str = "") -> Entry:
     advice = advice or tr(
         "make it readable, restore it from a backup, or delete it in All sessions"
     )
-    return Entry(path, f"{text}; {advice or usual}", is_enabled=False)
+    return Entry(path, f"{text}; {advice}", is_enabled=False)
 
 
 def _text(wearer: str, started: str, alignments: int, verified: int, trials: int) -> str:
