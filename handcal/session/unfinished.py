@@ -31,8 +31,9 @@ class UnfinishedSession:
     damaged: int = 0
     """Number of damaged parts, which are left out when it is resumed."""
     problem: str = ""
+    """Reason why it cannot be resumed, such as another program; empty if it can."""
     advice: str = ""
-    """Reason why it cannot be resumed, such as another program, and what to do; empty if it can."""
+    """What to do about it, if the reason tells."""
     is_repaired: bool = False
     """True if a repaired copy of this damaged session is in the same folder."""
 

@@ -226,11 +226,11 @@ class Program(QObject):
         }
         self.review.opened.connect(self._current.add_session)
         self.review.failed.connect(self._on_ended)
-        review_page.export_requested.connect(lambda: self.windows.export())
-        review_page.openxr_requested.connect(lambda: self.windows.use_in_openxr())
-        review_page.resume_requested.connect(self._resume_reviewed)
-        review_page.again_requested.connect(self._begin_from_shown)
-        review_page.close_requested.connect(self.show_start)
+        review_page.export_button.clicked.connect(lambda: self.windows.export())
+        review_page.openxr_button.clicked.connect(lambda: self.windows.use_in_openxr())
+        review_page.resume_button.clicked.connect(self._resume_reviewed)
+        review_page.again_button.clicked.connect(self._begin_from_shown)
+        review_page.close_button.clicked.connect(self.show_start)
         self.wizard_panel.eyes_chosen.connect(lambda eyes: self._current.change(plan=eyes))
         self.wizard_panel.hold_changed.connect(
             lambda is_held: self._current.change(runs_itself=not is_held)

@@ -44,8 +44,6 @@ _GREY = 0.8
 _BAR_PX = 12
 _STATUS_NS = 200_000_000
 """Interval of the numbers below the image; nobody reads faster."""
-_LONG = 60
-"""Characters of a reason beside the image; the guide and the cloud have the whole."""
 _EMPTY = tr("The camera's image will appear here.")
 _NO_COLOR = tr("This camera has no colour image.")
 
@@ -283,8 +281,7 @@ def _caption(seen: Observation) -> str:
         return tr("Rotated by {:.1f}°: too far").format(
             np.degrees(np.linalg.norm(seen.rotation_rad))
         )
-    problem = sentence(seen.problem)
-    return problem if len(problem) <= _LONG else problem.split(";")[0].split(",")[0]
+    return sentence(seen.problem)
 
 
 class DepthColors:

@@ -74,6 +74,7 @@ _REASONS = {
     "moved": tr("Last: moved too fast."),
     "shape changed": tr("Last: shape changed."),
     "no hand": tr("Last: no hand."),
+    "no image": tr("Last: no image of that moment."),
     "clock set": tr("Last: headset's clock set."),
     "out of view": tr("Last: hand partly out of view."),
     "drawn otherwise": tr("Last: the drawn φ had changed."),
@@ -106,8 +107,6 @@ class RotationPanel(QWidget):
         self._limit_line = self._plot.add_line("red", dashed=True)
         self._angle_line = self._plot.add_line("live")
         self._limit_rad = 0.0
-        self._refused = ("", "")
-        self._fitted: object = None
         self._lay_out()
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
@@ -130,7 +129,6 @@ class RotationPanel(QWidget):
         elif observation is not None:
             self._show_observation(observation)
             self._show_history(1e-9 * snapshot.t_host_ns, observation.rotation_rad)
-        self._fit()
 
     def _show_observation(self, observation: Observation) -> None:
         if observation.rotation_rad is None:
@@ -196,25 +194,11 @@ class RotationPanel(QWidget):
             # The journal may follow the refusal by a frame.
             counted = pluralize(max(count, 1), tr("confirmation"), tr("confirmations"))
             refused = tr("{} refused.").format(counted)
-        self._refused = refused, f"{refused} {sentence(last)}".strip()
-
-    def _fit(self) -> None:
-        """Leave out what there is no room for: the last refusal's reason, then the history."""
-        advice_px = self._advice.heightForWidth(self._advice.width())
-        if self._fitted == (fitted := (self.size(), advice_px, self._refused)):
-            return
-        self._fitted = fitted
-        count, reason = self._refused
-        self._refusals.setToolTip(reason)
-        for refused, has_history in ((reason, True), (count, True), (count, False)):
-            self._refusals.setText(refused)
-            self._plot.setVisible(has_history)
-            if self._box.minimumHeightForWidth(self.width()) <= self.height():
-                break
+        self._refusals.setText(f"{refused} {sentence(last)}".strip())
 
     def _lay_out(self) -> None:
         top = hbox((self._dial, 3), (self._hand, 2), spacing=SPACING_PX)
-        self._box = vbox(
+        vbox(
             (top, 3),
             self._advice,
             (self._plot, 2),

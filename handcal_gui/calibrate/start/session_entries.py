@@ -105,14 +105,12 @@ def _recent(path: Path) -> Entry | None:
     return Entry(path, text, wearer=state.wearer, eyes=eye_outcomes(state))
 
 
-def _unreadable(path: Path, why: str, advice: str = "") -> Entry:
+def _unreadable(path: Path, why: str, advice: str) -> Entry:
     """Return a session that cannot be chosen, with the reason and what to do."""
     named = why.replace(str(path), path.name)
     text = named if path.name in named else f"{path.name}: {named}"
-    advice = advice or tr(
-        "make it readable, restore it from a backup, or delete it in All sessions"
-    )
-    return Entry(path, f"{text}; {advice}", is_enabled=False)
+    otherwise = tr("make it readable, restore it from a backup, or delete it in All sessions")
+    return Entry(path, f"{text}; {advice or otherwise}", is_enabled=False)
 
 
 def _text(wearer: str, started: str, alignments: int, verified: int, trials: int) -> str:

@@ -18,8 +18,12 @@ from handcal.register.benefit import DISTANCES_M
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.session.record import SessionRecord
 from handcal.station.snapshot import Snapshot
-from handcal_gui.calibrate.results.panel import ResultsPanel, _CompareTab, _ConvergencePlot
-from handcal_gui.calibrate.results.residuals import ResidualMap
+from handcal_gui.calibrate.results.panel import (
+    ResidualMap,
+    ResultsPanel,
+    _CompareTab,
+    _ConvergencePlot,
+)
 from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.result_rows import REGISTRATION
 from handcal_gui.widgets.table import Table
