@@ -130,7 +130,7 @@ def _with(settings: Any, changes: Mapping[str, Any]) -> object:
 
 
 class _Kind(NamedTuple):
-    """How a kind of field tells a change, shows a value, and gives the one entered."""
+    """A kind of field: its signal of a change, and how it shows and returns a value."""
 
     change: Callable[[Any], Any]
     show: Callable[[Any, Any], object]
