@@ -13,7 +13,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.lab.settings import NoiseStudySettings
 from handcal_gui.evaluate.entries import EvaluationEntries
-from handcal_gui.evaluate.preparation import Preparation, PreparationDialog
+from handcal_gui.evaluate.evaluation_page import Preparation, PreparationDialog
 from handcal_gui.evaluate.window import EvaluationWindow
 from tests.gui.helpers import child
 
