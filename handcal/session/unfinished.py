@@ -32,6 +32,8 @@ class UnfinishedSession:
     """Number of damaged parts, which are left out when it is resumed."""
     problem: str = ""
     """Reason why it cannot be resumed, such as another program; empty if it can."""
+    advice: str = ""
+    """What to do about it, if the reason tells."""
     is_repaired: bool = False
     """True if a repaired copy of this damaged session is in the same folder."""
 
@@ -97,5 +99,5 @@ def _inspect(
         FileLock(path / "lock").release()  # only a test: reading takes too long to hold it
         record = Session.open(path)
     except FileError as error:
-        return UnfinishedSession(path, started, problem=str(error))
+        return UnfinishedSession(path, started, problem=error.what, advice=error.advice)
     return summarize(record, started, has_copy=has_copy)

@@ -89,7 +89,13 @@ class Program(QObject):
         self.live = CalibrationController(self.window, self.wizard_panel)
         self.review = ReviewController(self.window, review_page)
         self.windows = SeparateWindows(
-            self.window, self.start, self.live, self.review, self._current
+            self.window,
+            self.start,
+            self.live,
+            self.review,
+            self._current,
+            self.open_session,
+            self.resume_session,
         )
         self._connect(review_page)
         self._make_menus()
@@ -202,17 +208,15 @@ class Program(QObject):
         self.start.stop()
 
     def _connect(self, review_page: ReviewPage) -> None:
-        self.start.start_requested.connect(self.start_calibration)
-        self.start.cancel_requested.connect(self.live.cancel)
-        self.start.resume_requested.connect(self.resume_session)
-        self.start.open_requested.connect(self.open_session)
+        self.start.new.start_requested.connect(self.start_calibration)
+        self.start.new.cancel_requested.connect(self.live.cancel)
+        self.start.unfinished.chosen.connect(self.resume_session)
+        self.start.recent.chosen.connect(self.open_session)
         self.start.example_requested.connect(self.open_example)
         self.start.library_requested.connect(self.windows.show_library)
-        self.start.rig_wanted.connect(self.windows.calibrate_rig)
-        self.start.connect_wanted.connect(self.windows.connect_headset)
-        self.start.evaluation_wanted.connect(self.windows.evaluate)
-        self.windows.open_requested.connect(self.open_session)
-        self.windows.resume_requested.connect(self.resume_session)
+        self.start.new.form.calibrate_rig.clicked.connect(lambda: self.windows.calibrate_rig())
+        self.start.new.form.connect_headset = self.windows.connect_headset
+        self.start.evaluate.clicked.connect(lambda: self.windows.evaluate())
         self.live.ended.connect(self._on_ended)
         self.live.opened.connect(self._current.add_session)
         self.live.on = {
@@ -222,11 +226,11 @@ class Program(QObject):
         }
         self.review.opened.connect(self._current.add_session)
         self.review.failed.connect(self._on_ended)
-        review_page.export_requested.connect(lambda: self.windows.export())
-        review_page.openxr_requested.connect(lambda: self.windows.use_in_openxr())
-        review_page.resume_requested.connect(self._resume_reviewed)
-        review_page.again_requested.connect(self._begin_from_shown)
-        review_page.close_requested.connect(self.show_start)
+        review_page.export_button.clicked.connect(lambda: self.windows.export())
+        review_page.openxr_button.clicked.connect(lambda: self.windows.use_in_openxr())
+        review_page.resume_button.clicked.connect(self._resume_reviewed)
+        review_page.again_button.clicked.connect(self._begin_from_shown)
+        review_page.close_button.clicked.connect(self.show_start)
         self.wizard_panel.eyes_chosen.connect(lambda eyes: self._current.change(plan=eyes))
         self.wizard_panel.hold_changed.connect(
             lambda is_held: self._current.change(runs_itself=not is_held)

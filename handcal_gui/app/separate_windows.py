@@ -37,7 +37,6 @@ from handcal_gui.connect.openxr_dialog import OpenxrDialog
 from handcal_gui.evaluate.entries import EvaluationEntries
 from handcal_gui.library.export_dialog import Export, ExportDialog
 from handcal_gui.widgets.numbers import pluralize
-from handcal_gui.widgets.placement import keep_on_screen
 
 if TYPE_CHECKING:  # imported when they open: they take longer than all the rest
     from handcal_gui.evaluate.window import EvaluationWindow
@@ -55,15 +54,10 @@ class SeparateWindows(QObject):
     live : CalibrationController
     review : ReviewController
     current : CurrentPreferences
-
-    Attributes
-    ----------
-    open_requested, resume_requested : Signal(Path)
-        A session to open, or to resume.
+    open_session, resume_session : callable
+        Open a stored session, or resume it, by its folder.
     """
 
-    open_requested = Signal(object)
-    resume_requested = Signal(object)
     _ending = Signal()
 
     def __init__(
@@ -73,8 +67,11 @@ class SeparateWindows(QObject):
         live: CalibrationController,
         review: ReviewController,
         current: CurrentPreferences,
+        open_session: Callable[[Path], object],
+        resume_session: Callable[[Path], object],
     ) -> None:
         super().__init__()
+        self._open_session, self._resume_session = open_session, resume_session
         self._window, self._start = window, start
         self._live, self._review = live, review
         self._current = current
@@ -99,7 +96,7 @@ class SeparateWindows(QObject):
             self._window, tr("Open a session's folder"), self._current.now.station.sessions
         )
         if folder:
-            self.open_requested.emit(Path(folder))
+            self._open_session(Path(folder))
 
     def why_no_export(self) -> str:
         """Return why the session shown cannot be exported; empty if it can, or if none is shown."""
@@ -157,8 +154,8 @@ class SeparateWindows(QObject):
             from handcal_gui.library.window import LibraryWindow
 
         window = LibraryWindow(folder, self._window)
-        window.open_requested.connect(self.open_requested)
-        window.resume_requested.connect(self.resume_requested)
+        window.open_requested.connect(self._open_session)
+        window.resume_requested.connect(self._resume_session)
         window.export_requested.connect(lambda paths: self.export_many(paths, window))
         for changed in (window.changed, window.finished):  # closing cancels what runs
             changed.connect(self._review.read_wearer)
@@ -214,8 +211,8 @@ class SeparateWindows(QObject):
             self._window.banner.show_message(str(error))
             return None
         read = partial(read_manual, self._window)
-        wizard = RigWizard(folder, self._window, self._start.new.settings.realsense, read)
-        wizard.rig_saved.connect(self._use_rig)
+        realsense = self._start.new.settings.realsense
+        wizard = RigWizard(folder, self._window, realsense, read, self._use_rig)
         wizard.finished.connect(self._start.new.check)
         self._open(wizard, wizard.accept)
         return wizard
@@ -235,13 +232,12 @@ class SeparateWindows(QObject):
         entries, proposed = self._current.now.evaluation, self._current.now.station.sessions
         if not entries.users.sessions:
             entries = replace(entries, users=replace(entries.users, sessions=proposed))
-        window = EvaluationWindow(make_specs(), entries, self._window)
+        read = partial(read_manual, self._window)
+        window = EvaluationWindow(make_specs(), entries, self._window, read)
         window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         window.remembered.connect(partial(self._remember_evaluation, proposed))
-        window.manual_wanted.connect(partial(read_manual, self._window))
         self._ending.connect(window.stop)
         window.show()
-        keep_on_screen(window)
         return window
 
     def make_support_bundle(self) -> SupportDialog:
@@ -257,7 +253,6 @@ class SeparateWindows(QObject):
         """Let the user change the preferences."""
         self._start.keep_entries(self._current)
         dialog = PreferencesDialog(self._current.now, self._window)
-        keep_on_screen(dialog)
         if dialog.exec():
             self._current.use(dialog.preferences())
             use_theme(self._current.now.theme)
@@ -281,7 +276,6 @@ class SeparateWindows(QObject):
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self._ending.connect(stop)
         dialog.open()
-        keep_on_screen(dialog)
 
     def _use_rig(self, path: Path) -> None:
         station = replace(self._current.now.station, rig=str(path))

@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFormLayout, QLabel, QWidget
 
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
-from handcal_gui.app.theme import SPACING_PX, font_px, scale_font
+from handcal_gui.app.theme import SPACING_PX, scale_font
 from handcal_gui.app.translation import tr
 from handcal_gui.calibrate.parts.result_card import ResultCard
-from handcal_gui.calibrate.results.residuals import ResidualsTab
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import button, main_button, paragraph
-from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.sentence import sentence
 from handcal_gui.widgets.session_rows import RESUME_HELP, session_facts
 
-_LOW = 34
-"""Height below which the page leaves out details, in sizes of the font."""
-_LEAST_MAP_PX = 240
-"""Height below which the residual map is left to the panel of the results."""
 _EXPORT = tr("Look at the result, then export it, or resume the session to add to it.")
 _RESUME = tr("Resume the session to make its first alignment.")
 
@@ -32,18 +26,9 @@ class ReviewPage(QWidget):
 
     Attributes
     ----------
-    residuals : ResidualsTab
-        The residual map of an alignment, where the window is high enough.
-    export_requested, openxr_requested, resume_requested : Signal()
-    again_requested, close_requested : Signal()
-        *again_requested*: the wearer is to be calibrated again, beginning from this session.
+    export_button, openxr_button, resume_button, again_button, close_button : QPushButton
+        *again_button*: the wearer is to be calibrated again, beginning from this session.
     """
-
-    export_requested = Signal()
-    openxr_requested = Signal()
-    resume_requested = Signal()
-    again_requested = Signal()
-    close_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -51,39 +36,37 @@ class ReviewPage(QWidget):
         self._title: QLabel = ElidedLabel()
         scale_font(self._title, 1.6, is_bold=True)
         self._task = paragraph("reviewTask")
-        self._has_maps = False
-        self._fit_soon = fit_soon(self._fit, self)
         self._facts = QFormLayout()
         self._facts.setHorizontalSpacing(2 * SPACING_PX)
         self._facts.setVerticalSpacing(SPACING_PX)
         self._card = ResultCard(is_explained=True)
-        self.residuals = ResidualsTab()
-        self._export = main_button("reviewExport", tr("E&xport…"))
-        self._openxr = button("reviewOpenxr", tr("&Use in XR"))
-        self._openxr.setToolTip(tr("Use for every OpenXR program on this computer"))
-        self._resume = button("reviewResume", tr("&Resume"))
-        self._resume.setToolTip(RESUME_HELP)
-        self._again = button("reviewAgain", tr("Calibrate &again"))
-        self._again.setToolTip(
+        self.export_button = main_button("reviewExport", tr("E&xport…"))
+        self.openxr_button = button("reviewOpenxr", tr("&Use in XR"))
+        self.openxr_button.setToolTip(tr("Use for every OpenXR program on this computer"))
+        self.resume_button = button("reviewResume", tr("&Resume"))
+        self.resume_button.setToolTip(RESUME_HELP)
+        self.again_button = button("reviewAgain", tr("Calibrate &again"))
+        self.again_button.setToolTip(
             tr(
                 "For the same wearer again, or after the headset has slipped: starts from "
                 "this result and first verifies each eye"
             )
         )
-        close = button("reviewClose", tr("Clo&se"))
-        self._export.clicked.connect(self.export_requested)
-        self._openxr.clicked.connect(self.openxr_requested)
-        self._resume.clicked.connect(self.resume_requested)
-        self._again.clicked.connect(self.again_requested)
-        close.clicked.connect(self.close_requested)
-        buttons = hbox(self._export, self._openxr, self._resume, self._again, 0, close)
+        self.close_button = button("reviewClose", tr("Clo&se"))
+        buttons = hbox(
+            self.export_button,
+            self.openxr_button,
+            self.resume_button,
+            self.again_button,
+            0,
+            self.close_button,
+        )
         vbox(
             self._title,
             self._task,
             self._facts,
             self._card,
             buttons,
-            (self.residuals, 1),
             0,
             on=self,
             margins=2 * SPACING_PX,
@@ -110,16 +93,12 @@ class ReviewPage(QWidget):
             The current activity, or the reason why there are no results or alignments.
         """
         self.show_wearer(record.wearer)
-        self._export.setEnabled(record.is_solvable)
-        self._openxr.setEnabled(record.is_solvable)
-        self._again.setEnabled(results is not None)
+        self.export_button.setEnabled(record.is_solvable)
+        self.openxr_button.setEnabled(record.is_solvable)
+        self.again_button.setEnabled(results is not None)
         self._task.setText(_EXPORT if record.is_solvable else _RESUME)
         self._card.show_results(results, record, target_arcmin)
         self._card.setVisible(results is not None)
-        if results is not None:
-            self.residuals.show_results(results, record.alignments)
-        self._has_maps = results is not None and bool(results.alignments)
-        self._fit()
         while self._facts.rowCount():
             self._facts.removeRow(0)
         for name, (caption, fact) in _facts(record, note).items():
@@ -130,21 +109,6 @@ class ReviewPage(QWidget):
     def show_wearer(self, wearer: str) -> None:
         """Show the wearer's name as the title."""
         self._title.setText(wearer or tr("Session without a name"))
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Show the residual map only where it fits below the rest."""
-        super().resizeEvent(event)
-        self._fit_soon.start()
-
-    def _fit(self) -> None:
-        viewport, layout = self.parentWidget() or self, self.layout()
-        is_low = viewport.height() < _LOW * font_px()
-        if layout is not None:
-            layout.setSpacing(SPACING_PX if is_low else 2 * SPACING_PX)
-        parts = self._title, self._task, self._facts, self._card, self._export
-        others_px = sum(2 * SPACING_PX + part.sizeHint().height() for part in parts)
-        room_px = viewport.height() - others_px - 4 * SPACING_PX
-        self.residuals.setVisible(self._has_maps and room_px > _LEAST_MAP_PX)
 
 
 def _facts(record: SessionRecord, note: str) -> dict[str, tuple[str, str]]:

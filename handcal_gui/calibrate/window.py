@@ -98,6 +98,17 @@ class MainWindow(QMainWindow):
         self._parts: dict[str, Section | Tabs] = {**self.sections, "tabs": self.tabs}
         for name, one in self._parts.items():
             one.asked.connect(partial(self._choose, name))
+        # Keys that work in the whole window work while their panel is folded, too.
+        self._far_reaching = {
+            name: [
+                action
+                for action in getattr(panels, name).actions()
+                if action.shortcutContext() is Qt.ShortcutContext.WindowShortcut
+            ]
+            for name in TITLES
+        }
+        for actions in self._far_reaching.values():
+            self.addActions(actions)
         self._chosen: dict[str, bool] = {}  # open or folded by the user
         self._opened: set[str] = set()  # as there was something to show
         self._shares = list(_SHARES)
@@ -283,8 +294,10 @@ class MainWindow(QMainWindow):
         self.tabs.offer(offered & {*TABS})
         self.tabs.setVisible(bool(offered))
         self.tabs.set_open(self._chosen.get("tabs", self._page == "review"))
-        for name, action in self._go_to.items():
-            action.setEnabled(name in offered)
+        for name, go_to in self._go_to.items():
+            go_to.setEnabled(name in offered)
+            for action in self._far_reaching[name]:
+                action.setVisible(name in offered)
         share_height(self._columns[0], [self.sections[name] for name in LEFT])
         share_height(self._columns[1], [*(self.sections[name] for name in RIGHT), self.tabs])
         for side in self._sides:

@@ -24,7 +24,6 @@ from handcal_gui.widgets.fields import button, main_button, make_linked, paragra
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import keep_space, vbox
-from handcal_gui.widgets.placement import keep_on_screen
 
 
 class PreparationDialog(QDialog):
@@ -82,19 +81,24 @@ class EvaluationPage(QWidget):
     spec : EvaluationSpec
     entries : object
         Dataclass with the initial values.
+    read : callable
+        Shows a page of the manual.
 
     Attributes
     ----------
     busy_changed : Signal(bool)
-    manual_wanted : Signal(str)
-        The user wants to read a page of the manual.
     form : EntriesForm
     """
 
     busy_changed = Signal(bool)
-    manual_wanted = Signal(str)
 
-    def __init__(self, spec: EvaluationSpec, entries: Any, parent: QWidget | None = None) -> None:
+    def __init__(
+        self,
+        spec: EvaluationSpec,
+        entries: Any,
+        read: Callable[[str], object] = lambda _page: None,
+        parent: QWidget | None = None,
+    ) -> None:
         super().__init__(parent)
         self._evaluation = spec.evaluation
         self._question_text = spec.question
@@ -118,7 +122,7 @@ class EvaluationPage(QWidget):
         keep_space(self._found)
         self._results = ResultsView(spec.coming)
         self._look = LatestJob(self._check, self)
-        self._lay_out(spec)
+        self._lay_out(spec, read)
         self.form.changed.connect(self._on_entries_changed)
         self._button.clicked.connect(self.run)
         for prepare, preparation in self._preparing.items():
@@ -182,7 +186,6 @@ class EvaluationPage(QWidget):
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.finished.connect(self._end_preparing)
         dialog.open()
-        keep_on_screen(dialog)
 
     def _end_preparing(self) -> None:
         assert self._dialog is not None
@@ -278,9 +281,9 @@ class EvaluationPage(QWidget):
             return replace(finding, found=tr("Cancelled; the next run starts from the beginning"))
         return replace(finding, found=tr("Cancelled; {}").format(finding.found))
 
-    def _lay_out(self, spec: EvaluationSpec) -> None:
+    def _lay_out(self, spec: EvaluationSpec, read: Callable[[str], object]) -> None:
         note = make_linked(paragraph("format", spec.note))
-        note.linkActivated.connect(self.manual_wanted)
+        note.linkActivated.connect(read)
         note.setVisible(bool(spec.note))
         vbox(
             self._question,

@@ -18,8 +18,7 @@ from handcal.session.session import SessionRecord
 from handcal.session.state import SessionEvent, SessionState
 from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
-from handcal_gui.calibrate.guide.step_views import save_view
-from handcal_gui.calibrate.guide.steps import Wizard
+from handcal_gui.calibrate.guide.steps import Wizard, save_view
 from handcal_gui.calibrate.guide.view import Action, Step, WizardView
 
 RECOMMENDED = PlanSettings("recommended", is_automatic=True)
@@ -96,6 +95,14 @@ def tried(seen: Snapshot) -> Snapshot:
     return replace(seen, record=replace(seen.record, trials=trials))
 
 
+def used_anyway(seen: Snapshot) -> Snapshot:
+    """Return a snapshot in which every result is final, whatever its verdict."""
+    assert seen.procedure.results is not None
+    solved_m = {eye: shift.shift_m for eye, shift in seen.procedure.results.eyes.items()}
+    record = replace(fine_tuned(seen.record, solved_m), applied_shift_m=solved_m)
+    return replace(seen, record=record)
+
+
 def actions(view: WizardView) -> list[Action]:
     return [offer.action for offer in view.others]
 
@@ -133,6 +140,7 @@ def all_views(snapshot: Callable[..., Snapshot], record: SessionRecord) -> list[
             replace(done, procedure=replace(done.procedure, results=None)),
             planned_snapshot(snapshot, StepName.DONE, plan=plan, verified={}),
             tried(judged(snapshot, "accept", "accept", State.APPLIED, plan=plan)),
+            used_anyway(judged(snapshot, "keep", "accept", State.APPLIED, plan=plan)),
         ]
         for names in (("accept", "accept"), ("keep", "accept"), ("implausible", "repeat")):
             for state in (State.SOLVED, State.APPLIED):

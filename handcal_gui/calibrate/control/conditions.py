@@ -46,6 +46,7 @@ class Conditions:
         self.is_slow = False
         self._is_usb = is_usb
         self._is_virtual = is_virtual
+        self._loses = False
         self._is_camera = False  # it gives few frames, and none is lost in this computer
         self._rate_since_s: float | None = None
         self._dropped: deque[tuple[float, int]] = deque()
@@ -127,6 +128,7 @@ class Conditions:
             self._rate_since_s = now_s
         elif now_s - self._rate_since_s >= _SLOW_S:
             self.is_slow, self._rate_since_s = not self.is_slow, None
+            self._loses = loses and not is_few
             # Frames that the camera counted, but nobody took, are lost in this computer.
             self._is_camera = self._is_usb and lost_hz == 0.0
 
@@ -134,7 +136,9 @@ class Conditions:
         """Return the warning about few frames, with what it leads to; empty if there are enough."""
         if not self.is_slow:
             return ""
-        if rate_hz >= _SLOW_HZ:
+        if rate_hz >= _SLOW_HZ and not self._loses:
+            return ""  # it is getting better
+        if self._loses:
             return tr("fewer than two thirds of the camera's frames are used; close other programs")
         advice = tr("close other programs")
         if self._is_camera:

@@ -62,7 +62,7 @@ class ReviewController(QObject):
         # Without an answer, as of a session deleted meanwhile, what is shown stays.
         self._wearer = LatestJob(lambda path: replay(path).state.wearer, self)
         self._wearer.answered.connect(self._show_wearer)
-        page.residuals.shown.connect(self._show_alignment)
+        window.panels.results.residuals.shown.connect(self._show_alignment)
 
     def open(self, path: Path) -> None:
         """Read and solve a session, then show it."""
@@ -130,17 +130,17 @@ class ReviewController(QObject):
         panels = self._window.panels
         lack = _without_alignments(record)
         target_arcmin = stored.settings.verdict.target_arcmin
-        panels.results.show_results(stored.results, record, target_arcmin)
-        panels.session.set_read_only(True)
-        panels.session.show_record(record, stored.results)
-        panels.trials.set_read_only(True)
-        panels.trials.show_record(record)
         panels.cloud.clear(lack)  # of the session shown before
         if stored.results is not None:
             panels.results.comparison.use(record, stored.settings)
             for number, last in [*record.alignments.items()][-1:]:
                 self._show_alignment(number, last.eyes[0])
-        # Then: if it is on the screen, it chooses the alignment whose clouds are shown.
+        # Then: residuals on the screen choose the alignment whose clouds are shown.
+        panels.results.show_results(stored.results, record, target_arcmin)
+        panels.session.set_read_only(True)
+        panels.session.show_record(record, stored.results)
+        panels.trials.set_read_only(True)
+        panels.trials.show_record(record)
         note = lack or _other_verdicts(stored)
         self._page.show_session(record, stored.results, target_arcmin, note)
         self._window.show_page("review")

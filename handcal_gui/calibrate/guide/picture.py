@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib.metadata import version
 
-from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QPagedPaintDevice, QTextDocument
 from PySide6.QtWidgets import QLabel, QStackedLayout, QWidget
 
@@ -68,7 +68,7 @@ class GuidePicture(QWidget):
         self._is_before = False
         self._blink = QTimer(self, interval=_BLINK_MS)
         self._blink.timeout.connect(lambda: self._show_before(not self._is_before))
-        self.result.blink_toggled.connect(self._set_blinking)
+        self.result.blink.toggled.connect(self._set_blinking)
         views = QWidget()
         both = QWidget()
         columns = ((one, 1) for one in self._columns.values())
@@ -170,11 +170,9 @@ class ResultBar(QWidget):
     ----------
     buttons : QWidget
     card : ResultCard
-    blink_toggled : Signal(bool)
-        Before and after should be shown in turn, or no longer.
+    blink : QAction
+        Checked while before and after are to be shown in turn.
     """
-
-    blink_toggled = Signal(bool)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -183,16 +181,15 @@ class ResultBar(QWidget):
         self._target_arcmin = VerdictSettings().target_arcmin
         self._record: SessionRecord | None = None
         self.card = ResultCard()
-        self._blink = add_action(
+        self.blink = add_action(
             self, tr("Bl&ink before/after"), "", tooltip=tr("Show both in turn")
         )
-        self._blink.setCheckable(True)
-        self._blink.toggled.connect(self.blink_toggled)
+        self.blink.setCheckable(True)
         copy = add_action(self, tr("Cop&y"), "", self.copy, tooltip=tr("Copy the result as text"))
         window = Qt.ShortcutContext.WindowShortcut
         ask = add_action(self, tr("Print the result"), "Ctrl+P", self._ask_printer, context=window)
         ask.setIconText(tr("Print… (Ctrl+P)"))
-        self._blink_button, *others = map(tool_button, (self._blink, copy, ask))
+        self._blink_button, *others = map(tool_button, (self.blink, copy, ask))
         self.buttons = QWidget()
         hbox(self._blink_button, *others, on=self.buttons, margins=0, spacing=SPACING_PX)
         vbox(self.card, on=self, margins=0)
@@ -209,7 +206,7 @@ class ResultBar(QWidget):
         """Offer to show before and after in turn, where they are in sight."""
         self._blink_button.setVisible(is_offered)
         if not is_offered:
-            self._blink.setChecked(False)
+            self.blink.setChecked(False)
 
     def text(self) -> str:
         """Return the result as text; empty if there is none."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import zip_longest
 
-from PySide6.QtCore import QRectF, QSignalBlocker, Qt, Signal
+from PySide6.QtCore import QRectF, QSignalBlocker, Qt, Signal, SignalInstance
 from PySide6.QtGui import QAction, QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QShortcut
 from PySide6.QtWidgets import QApplication, QComboBox, QHBoxLayout, QLabel, QSizePolicy, QWidget
 
@@ -89,8 +89,6 @@ class WizardPanel(QWidget):
     picture : GuidePicture
     comparison : ComparisonRow
         Shown in the station while the wearer compares.
-    asked : Signal(Action)
-        A button was pressed.
     eyes_chosen : Signal(str)
         A person has chosen the eyes of the paper's plan: an `EyePlan`.
     hold_changed : Signal(bool)
@@ -105,7 +103,6 @@ class WizardPanel(QWidget):
         Another step is shown.
     """
 
-    asked = Signal(object)
     step_changed = Signal(object)
     eyes_chosen = Signal(str)
     hold_changed = Signal(bool)
@@ -145,11 +142,15 @@ class WizardPanel(QWidget):
         self._plan = QComboBox()
         self._plan.setObjectName("wizardPlan")
         self._lay_out()
-        self.bar.asked.connect(self.asked)
         self._plan.currentIndexChanged.connect(
             lambda index: self.eyes_chosen.emit(list(_ORDERS)[index])
         )
         follow_theme(self, self._refresh)
+
+    @property
+    def asked(self) -> SignalInstance:
+        """The signal of the bar: an `Action` was asked for."""
+        return self.bar.asked
 
     def start(self, wizard: Wizard, *, is_held: bool = True) -> None:
         """Switch to another wizard; if it is held, every step waits for a person."""

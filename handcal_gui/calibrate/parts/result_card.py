@@ -54,6 +54,8 @@ class EyeResult:
     shade: str
     """Name of the theme's colour for the verdict."""
     word: str
+    is_usable: bool
+    """False for a result that must not be used."""
     error: str
     """The error that was verified, or else is expected; empty if there is none to rely on."""
     drawn: str
@@ -82,6 +84,7 @@ def eye_results(
             eye,
             verdict_color(verdict.name, trials.get(eye)),
             verdict_word(*given),
+            verdict.name not in ("implausible", "contradicted"),
             _error(results, record, eye, trials.get(eye)),
             _drawn(results, record, eye, drawn[eye]),
             verdict_reason(*given),
@@ -209,7 +212,7 @@ class ResultCard(QWidget):
 
     def _explain(self, is_explained: bool) -> None:
         for eye_column in self._columns.values():
-            eye_column.why.setVisible(is_explained)
+            eye_column.explain(is_explained)
 
     def _refresh(self) -> None:
         for eye_column in self._columns.values():
@@ -223,6 +226,7 @@ class _Column(QWidget):
         super().__init__()
         self._eye = eye
         self._result: EyeResult | None = None
+        self._is_explained = False
         self._verdict = paragraph(f"card-verdict-{eye}")
         scale_font(self._verdict, 1.2, is_bold=True)
         self._drawn = paragraph(f"card-drawn-{eye}")
@@ -230,15 +234,10 @@ class _Column(QWidget):
         self._reason = paragraph(f"card-reason-{eye}")
         self._details = paragraph(f"card-details-{eye}")
         self.why = QWidget()
-        vbox(
-            self._bars,
-            self._reason,
-            self._details,
-            on=self.why,
-            margins=0,
-            spacing=SPACING_PX // 2,
-        )
-        vbox(self._verdict, self._drawn, self.why, 0, on=self, margins=0, spacing=SPACING_PX // 2)
+        gap_px = SPACING_PX // 2
+        vbox(self._bars, self._details, on=self.why, margins=0, spacing=gap_px)
+        parts = self._verdict, self._drawn, self._reason, self.why
+        vbox(*parts, 0, on=self, margins=0, spacing=gap_px)
 
     def show_result(
         self,
@@ -254,7 +253,15 @@ class _Column(QWidget):
         self._reason.setText(result.reason if result else "")
         self._details.setText("\n".join(result.details) if result else "")
         self._bars.show_bars(result.bars if result else (), target_arcmin, scale_arcmin, names)
+        self.explain(self._is_explained)
         self.refresh()
+
+    def explain(self, is_explained: bool) -> None:
+        """Show what is behind *Why?*; the reason not to use a result is always in sight."""
+        self._is_explained = is_explained
+        is_refused = self._result is not None and not self._result.is_usable
+        self.why.setVisible(is_explained)
+        self._reason.setVisible(is_explained or is_refused)
 
     def refresh(self) -> None:
         """Take the colours of the theme; style sheets would keep the size of the text."""

@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
+from functools import cache
 
 import numpy as np
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtCore import QLineF, QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import (
+    QColor,
+    QFont,
+    QPainter,
+    QPainterPath,
+    QPainterPathStroker,
+    QPaintEvent,
+    QPen,
+    QPolygonF,
+)
+from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
 from handcal.calibration.hands import PlacedHand
 from handcal.calibration.states import Observation, State
@@ -14,15 +26,30 @@ from handcal.core.types import Float64
 from handcal.register.guard import turn_advice
 from handcal.session.record import SessionRecord
 from handcal.station.snapshot import Snapshot
-from handcal_gui.app.theme import SPACING_PX, scale_font
+from handcal_gui.app.theme import SPACING_PX, colors, number_font, scale_font
 from handcal_gui.app.translation import tr
-from handcal_gui.calibrate.rotation.dial import RotationDial
-from handcal_gui.calibrate.rotation.turning_hand import TurningHand
+from handcal_gui.calibrate.parts.paint_turns import update_in_turn
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.sentence import sentence
 
+# The drawing is 200 units wide and high; its origin is the centre of the hand.
+_FINGERS = ((-16, 10, -50, -14), (-21, 0, -33, -52), (-7, -4, -11, -68), (7, -4, 10, -64),
+            (20, 2, 29, -44))  # fmt: skip
+_PALM = QRectF(-27, -14, 54, 54)
+_WRIST = QRectF(-18, 30, 36, 50)
+_RADIUS = 78.0
+_ARROW_DEG = 70.0
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+_FROM_DEG, _SPAN_DEG = 210.0, 240.0
+"""Start of the scale, counter-clockwise from three o'clock, and its extent clockwise."""
+_SCALE_LIMITS = 2.0
+"""End of the scale in multiples of the limit, which is thus at the top."""
+_WIDEST = 190
+"""Maximum width of a line of text; the dial is 200 wide."""
+_LEAST_PX = 9.0
+"""Smallest readable text, on the screen."""
 _HISTORY_S = 10.0
 _HISTORY_PERIOD_S = 0.2
 """Interval of redrawing the history while the hand is still."""
@@ -47,6 +74,7 @@ _REASONS = {
     "moved": tr("Last: moved too fast."),
     "shape changed": tr("Last: shape changed."),
     "no hand": tr("Last: no hand."),
+    "no image": tr("Last: no image of that moment."),
     "clock set": tr("Last: headset's clock set."),
     "out of view": tr("Last: hand partly out of view."),
     "drawn otherwise": tr("Last: the drawn φ had changed."),
@@ -79,8 +107,6 @@ class RotationPanel(QWidget):
         self._limit_line = self._plot.add_line("red", dashed=True)
         self._angle_line = self._plot.add_line("live")
         self._limit_rad = 0.0
-        self._refused = ("", "")
-        self._fitted: object = None
         self._lay_out()
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
@@ -103,7 +129,6 @@ class RotationPanel(QWidget):
         elif observation is not None:
             self._show_observation(observation)
             self._show_history(1e-9 * snapshot.t_host_ns, observation.rotation_rad)
-        self._fit()
 
     def _show_observation(self, observation: Observation) -> None:
         if observation.rotation_rad is None:
@@ -169,25 +194,11 @@ class RotationPanel(QWidget):
             # The journal may follow the refusal by a frame.
             counted = pluralize(max(count, 1), tr("confirmation"), tr("confirmations"))
             refused = tr("{} refused.").format(counted)
-        self._refused = refused, f"{refused} {sentence(last)}".strip()
-
-    def _fit(self) -> None:
-        """Leave out what there is no room for: the last refusal's reason, then the history."""
-        advice_px = self._advice.heightForWidth(self._advice.width())
-        if self._fitted == (fitted := (self.size(), advice_px, self._refused)):
-            return
-        self._fitted = fitted
-        count, reason = self._refused
-        self._refusals.setToolTip(reason)
-        for refused, has_history in ((reason, True), (count, True), (count, False)):
-            self._refusals.setText(refused)
-            self._plot.setVisible(has_history)
-            if self._box.minimumHeightForWidth(self.width()) <= self.height():
-                break
+        self._refusals.setText(f"{refused} {sentence(last)}".strip())
 
     def _lay_out(self) -> None:
         top = hbox((self._dial, 3), (self._hand, 2), spacing=SPACING_PX)
-        self._box = vbox(
+        vbox(
             (top, 3),
             self._advice,
             (self._plot, 2),
@@ -214,3 +225,201 @@ def _text_label(name: str, scale: float = 1.0, least_lines: int = 2) -> QLabel:
     scale_font(label, scale)
     label.setMinimumHeight(least_lines * label.fontMetrics().lineSpacing() + 2)
     return label
+
+
+class RotationDial(QWidget):
+    """Large digits within an arc that fills towards the limit, and a symbol and word below."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("rotation-dial")
+        self.setAccessibleName(tr("Rotation of the hand"))
+        self.setToolTip(tr("Rotation of the hand from the cursor, and its limit"))
+        self.setMinimumSize(100, 72)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self._angle_deg: float | None = None
+        self._limit_deg = 9.0
+        self._word, self._word_is_red = "", False
+        self._seen: tuple[object, ...] = ()
+
+    def sizeHint(self) -> QSize:
+        """Prefer a square that is readable from across the room."""
+        return QSize(220, 220)
+
+    @property
+    def is_over(self) -> bool:
+        """True if the angle shown exceeds the limit."""
+        return self._angle_deg is not None and self._angle_deg > self._limit_deg
+
+    def show_angle(
+        self, angle_rad: float | None, limit_rad: float, word: str, *, is_refused: bool = False
+    ) -> None:
+        """Show an angle and its meaning in a word or two; None if there is no angle.
+
+        The word of what is refused whatever its angle has the colour of too large an angle.
+        """
+        self._angle_deg = None if angle_rad is None else math.degrees(angle_rad)
+        self._limit_deg = math.degrees(limit_rad)
+        self._word_is_red = is_refused
+        if word != self._word:
+            self._word = word
+            self.setAccessibleDescription(word)
+        seen = self._digits, self.is_over, self._limit_deg, word, is_refused
+        if seen != self._seen:  # a tenth of a degree is no wider than the arc's end
+            self._seen = seen
+            update_in_turn(self)
+
+    @property
+    def _digits(self) -> str:
+        return "–" if self._angle_deg is None else f"{self._angle_deg:.1f}°"
+
+    def paintEvent(self, _: QPaintEvent) -> None:
+        """Draw the arc, its limit, the digits and the word."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        side = min(self.width(), self.height() * 1.1)
+        painter.translate(self.width() / 2, self.height() / 2 + 0.05 * side)
+        painter.scale(side / 200, side / 200)
+        self._paint_arc(painter)
+        text = self.palette().windowText().color()
+        fixed, normal = number_font(), self.font()
+        _write(painter, fixed, self._digits, -14, 46, self._color())
+        limit_size = round(min(max(13.0, _LEAST_PX * 200 / side), 23.0))
+        _write(painter, normal, tr("limit {:.1f}°").format(self._limit_deg), 22, limit_size, text)
+        color = QColor(colors().red) if self._word_is_red else self._color()
+        _write(painter, normal, self._word, 64, 22, color)
+
+    def _color(self) -> QColor:
+        if self._angle_deg is None:
+            return QColor(colors().muted)
+        return QColor(colors().red if self.is_over else colors().live)
+
+    def _paint_arc(self, painter: QPainter) -> None:
+        box = QRectF(-84, -84, 168, 168)
+        half = -_SPAN_DEG / _SCALE_LIMITS
+        track, beyond = QColor(colors().muted), QColor(colors().red)
+        track.setAlphaF(0.35)
+        beyond.setAlphaF(0.35)
+        _arc(painter, box, _FROM_DEG, half, QPen(track, 14))
+        _arc(painter, box, _FROM_DEG + half, half, QPen(beyond, 14))
+        if self._angle_deg is not None:
+            part = min(1.0, self._angle_deg / (_SCALE_LIMITS * self._limit_deg))
+            _arc(painter, box, _FROM_DEG, -part * _SPAN_DEG, QPen(self._color(), 14))
+        painter.setPen(QPen(self.palette().windowText().color(), 4))
+        painter.drawLine(QPointF(0, -94), QPointF(0, -72))
+
+
+def _arc(painter: QPainter, box: QRectF, from_deg: float, span_deg: float, pen: QPen) -> None:
+    pen.setCapStyle(Qt.PenCapStyle.FlatCap)
+    painter.setPen(pen)
+    painter.drawArc(box, round(16 * from_deg), round(16 * span_deg))
+
+
+def _write(painter: QPainter, font: QFont, text: str, y: float, size: int, color: QColor) -> None:
+    """Write one line centred at a height; smaller if it would be wider than the dial."""
+    font.setWeight(QFont.Weight.Bold if size > 20 else QFont.Weight.Normal)
+    font.setPixelSize(size)
+    painter.setFont(font)
+    width = painter.fontMetrics().horizontalAdvance(text)
+    if width > _WIDEST:
+        font.setPixelSize(int(size * _WIDEST / width))
+        painter.setFont(font)
+    painter.setPen(color)
+    painter.drawText(QRectF(-100, y - 40, 200, 80), Qt.AlignmentFlag.AlignCenter, text)
+
+
+class TurningHand(QWidget):
+    """Shows a hand; `show_turn` adds an axis and an arrow."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("turning-hand")
+        self.setAccessibleName(tr("Direction to turn the hand"))
+        self.setToolTip(tr("Direction to turn the hand, as the wearer sees it"))
+        self.setMinimumSize(80, 72)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self._turn = ("", False)
+
+    def sizeHint(self) -> QSize:
+        """Prefer a square."""
+        return QSize(150, 150)
+
+    def show_turn(self, axis: str, *, positive: bool = True) -> None:
+        """Show a rotation about an axis of the depth camera, or none.
+
+        Parameters
+        ----------
+        axis : {"x", "y", "z", ""}
+            Right, down and away from the wearer.
+        positive : bool
+            By the right-hand rule about the axis.
+        """
+        if (axis, positive) != self._turn:
+            self._turn = axis, positive
+            self.update()
+
+    def paintEvent(self, _: QPaintEvent) -> None:
+        """Draw circle and axis, the hand over them, and the arrow on top."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        side = min(self.width(), self.height())
+        painter.translate(self.width() / 2, self.height() / 2)
+        painter.scale(side / 200, side / 200)
+        axis, positive = self._turn
+        muted = QColor(colors().muted)
+        if axis:
+            painter.setPen(QPen(muted, 2, Qt.PenStyle.DashLine))
+            painter.drawPolyline(_on_screen(_circle(axis, 0.0, 360.0)))
+            painter.drawPolyline(_on_screen(np.outer([-95.0, 95.0], _AXES[axis])))
+        fill = QColor(muted)
+        fill.setAlphaF(0.45)
+        painter.setPen(QPen(muted, 2))
+        painter.setBrush(fill)
+        painter.drawPath(_hand())
+        if axis:
+            _paint_arrow(painter, axis, positive, self.palette().windowText().color())
+
+
+def _paint_arrow(painter: QPainter, axis: str, positive: bool, color: QColor) -> None:
+    end_deg = _ARROW_DEG if positive else -_ARROW_DEG
+    bend = _on_screen(_circle(axis, -end_deg, end_deg))
+    painter.setPen(QPen(color, 9, c=Qt.PenCapStyle.FlatCap, j=Qt.PenJoinStyle.RoundJoin))
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    painter.drawPolyline(bend)
+    direction = QLineF(bend[-3], bend[-1]).unitVector()
+    along = QPointF(direction.dx(), direction.dy())
+    across = QPointF(-along.y(), along.x())
+    tip = bend[-1]
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(color)
+    painter.drawPolygon(QPolygonF([tip + along * 20, tip + across * 15, tip - across * 15]))
+
+
+def _circle(axis: str, from_deg: float, to_deg: float) -> Float64:
+    """Return an arc about an axis, (49, 3); 0° is nearest the wearer, or at the top for z."""
+    start = np.array([0.0, -1.0, 0.0] if axis == "z" else [0.0, 0.0, -1.0])
+    quarter_on = np.cross(_AXES[axis], start)
+    angles = np.radians(np.linspace(from_deg, to_deg, 49))[:, None]
+    return np.asarray(_RADIUS * (np.cos(angles) * start + np.sin(angles) * quarter_on))
+
+
+def _on_screen(points: Float64) -> list[QPointF]:
+    """Project obliquely: points farther from the wearer are higher and more to the right."""
+    return [QPointF(x + 0.3 * z, y - 0.25 * z) for x, y, z in points.tolist()]
+
+
+@cache
+def _hand() -> QPainterPath:
+    """Return the outline of a right hand, seen from its back."""
+    bones = QPainterPath()
+    for x0, y0, x1, y1 in _FINGERS:
+        bones.moveTo(x0, y0)
+        bones.lineTo(x1, y1)
+    flesh = QPainterPathStroker()
+    flesh.setWidth(12)
+    flesh.setCapStyle(Qt.PenCapStyle.RoundCap)
+    palm = QPainterPath()
+    palm.addRoundedRect(_PALM, 14, 14)
+    wrist = QPainterPath()
+    wrist.addRect(_WRIST)
+    return flesh.createStroke(bones).united(palm).united(wrist).simplified()

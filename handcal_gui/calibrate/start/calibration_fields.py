@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QPalette
@@ -15,6 +13,7 @@ from handcal.hand.settings import Roi
 from handcal.station.checks.doctor import Finding
 from handcal_gui.app.theme import SPACING_PX, scale_font
 from handcal_gui.app.translation import tr
+from handcal_gui.widgets.entries_form import Bound
 from handcal_gui.widgets.fields import choice, label_for, number
 from handcal_gui.widgets.finding_line import FindingLine
 
@@ -124,35 +123,29 @@ class CalibrationFields(QWidget):
         self.add_row(tr("&Solver"), self._method, solves)
         self._near.valueChanged.connect(self._limit_gate)
         self._far.valueChanged.connect(self._limit_gate)
-        for field in (self._guard, self._near, self._far):
-            field.valueChanged.connect(self.changed)
-        for chosen in (self._roi, self._method):
-            chosen.currentIndexChanged.connect(self.changed)
+        self._bound = Bound(
+            {
+                "guard.limit_rad": self._guard,
+                "segment.depth_max_m": self._far,
+                "segment.depth_min_m": self._near,
+                "segment.roi": self._roi,
+                "solve.method": self._method,
+            },
+            {"guard.limit_rad": float(np.degrees(1.0))},
+            self,
+        )
+        self._bound.changed.connect(self.changed)
 
     def show_settings(self, settings: CalibrationSettings) -> None:
         """Show settings."""
-        self._guard.setValue(float(np.degrees(settings.guard.limit_rad)))
         self._near.setMaximum(_FARTHEST_M - _GATE_M)  # whatever is shown
         self._far.setMinimum(_NEAREST_M + _GATE_M)
-        self._far.setValue(settings.segment.depth_max_m)
-        self._near.setValue(settings.segment.depth_min_m)
+        self._bound.show(settings)
         self._limit_gate()
-        self._roi.setCurrentIndex(self._roi.findData(settings.segment.roi))
-        self._method.setCurrentIndex(self._method.findData(settings.solve.method))
 
     def take(self, settings: CalibrationSettings) -> CalibrationSettings:
         """Return settings with the entered values."""
-        return replace(
-            settings,
-            guard=replace(settings.guard, limit_rad=float(np.radians(self._guard.value()))),
-            segment=replace(
-                settings.segment,
-                roi=self._roi.currentData(),
-                depth_min_m=self._near.value(),
-                depth_max_m=self._far.value(),
-            ),
-            solve=replace(settings.solve, method=self._method.currentData()),
-        )
+        return self._bound.take(settings)
 
     def add_row(self, text: str, field: QWidget, meaning: str = "") -> QLabel | None:
         """Add a field below, and return its meaning beside it if the form explains fields.

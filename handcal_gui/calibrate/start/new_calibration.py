@@ -32,7 +32,7 @@ from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.widgets.brief import limit_length
 from handcal_gui.widgets.fields import button, main_button, paragraph, with_name
 from handcal_gui.widgets.key_cap import KeyCap
-from handcal_gui.widgets.layouts import fit_soon, hbox, keep_space, scrollable, vbox
+from handcal_gui.widgets.layouts import hbox, keep_space, scrollable, vbox
 from handcal_gui.widgets.sentence import sentence
 
 Check = Callable[[StationSettings, str, Progress], Mapping[Part, Finding]]
@@ -59,30 +59,24 @@ class NewCalibration(Card):
     ----------
     start_requested : Signal(StationSettings, str)
         The settings of a station that has just passed its checks, and the wearer.
-    changed : Signal()
-        The settings shown have changed.
-    rig_wanted, connect_wanted : Signal()
-        The user wants to calibrate a rig, or to connect a headset.
+    form : StationForm
     cancel_requested : Signal()
         The user cancels the opening of the station.
     """
 
     start_requested = Signal(object, str)
-    changed = Signal()
-    rig_wanted = Signal()
-    connect_wanted = Signal()
     cancel_requested = Signal()
 
     def __init__(self, preferences: Preferences, pairing_key: str, check: Check) -> None:
         super().__init__(
             tr("Start a calibration"),
-            tr("Enter a name, now or later in All sessions, and start; the settings are kept."),
+            tr("The settings are kept for the next wearer."),
             "hand",
         )
         self.setObjectName("newCalibration")
         self._key = pairing_key
         self._starting: str | None = None
-        self._is_opening = self._is_low = False
+        self._is_opening = False
         self._wearer = with_name(QComboBox(), "wearer", tr("Wearer's name or code"))
         name = QLineEdit(placeholderText=tr("Name or code"))
         limit_length(name, MAX_WEARER_CHARACTERS)
@@ -101,7 +95,7 @@ class NewCalibration(Card):
         wearer = QWidget()
         vbox(self._wearer, self._wearer_problem, on=wearer, margins=0, spacing=0)
         wearer.setFocusProxy(self._wearer)
-        self._form = StationForm(wearer, preferences.station, pairing_key)
+        self.form = StationForm(wearer, preferences.station, pairing_key)
         self._problem = paragraph("startProblem")
         self._button = main_button("start", tr("Start calibration"))
         self._start_key = KeyCap("startKey", "Return")
@@ -121,10 +115,7 @@ class NewCalibration(Card):
         self._again = QTimer(self, singleShot=True)
         self._settle.timeout.connect(self.check)
         self._again.timeout.connect(self.check)
-        self._form.changed.connect(self._settle.start)
-        self._form.changed.connect(self.changed)
-        self._form.rig_wanted.connect(self.rig_wanted)
-        self._form.connect_wanted.connect(self.connect_wanted)
+        self.form.changed.connect(self._settle.start)
         self._button.clicked.connect(self.start)
         self._cancel.clicked.connect(self._cancel_opening)
         app = QApplication.instance()
@@ -136,7 +127,7 @@ class NewCalibration(Card):
     @property
     def settings(self) -> StationSettings:
         """The settings as shown."""
-        return self._form.settings
+        return self.form.settings
 
     @property
     def is_changed(self) -> bool:
@@ -151,7 +142,7 @@ class NewCalibration(Card):
 
     def show_settings(self, settings: StationSettings) -> None:
         """Show other settings; a wearer's name that has been typed stays."""
-        self._form.show_settings(settings)
+        self.form.show_settings(settings)
         self._given = self.settings
 
     def show_wearers(self, names: Sequence[str]) -> None:
@@ -166,19 +157,13 @@ class NewCalibration(Card):
 
     def set_rig(self, path: str) -> None:
         """Show another rig file."""
-        self._form.set_rig(path)
+        self.form.set_rig(path)
 
     def set_pairing_key(self, pairing_key: str) -> None:
         """Use another key for network headsets."""
         self._key = pairing_key
-        self._form.set_pairing_key(pairing_key)
+        self.form.set_pairing_key(pairing_key)
         self.check()
-
-    def fit(self, *, is_low: bool) -> None:
-        """Set the form closer where height is scarce, and leave out the hint if it has no room."""
-        self._is_low = is_low
-        self._form.fit(is_low=is_low)
-        self._fit_soon.start()
 
     def check(self) -> None:
         """Check the station with the settings shown, unless it may be in use or being opened.
@@ -206,7 +191,7 @@ class NewCalibration(Card):
     def set_opening(self, is_opening: bool) -> None:
         """Disable the fields while a station is being opened, and show a Cancel button."""
         self._is_opening = is_opening
-        self._form.setEnabled(not is_opening)
+        self.form.setEnabled(not is_opening)
         self._cancel.setVisible(is_opening)
         self._cancel.setEnabled(True)
         self._problem.setText(tr("Opening camera and headset…") if is_opening else "")
@@ -260,18 +245,18 @@ class NewCalibration(Card):
         return _AGAIN_BY_PROCESS_MS if self.settings.source == "realsense" else _AGAIN_MS
 
     def _question(self) -> tuple[StationSettings, str]:
-        return self._form.settings, self._key
+        return self.form.settings, self._key
 
     def _on_findings(self, question: object, findings: Mapping[Part, Finding]) -> None:
         if self._is_opening or question != self._question():
             return  # outdated: an answer to the settings now shown will follow
-        self._form.show_findings(findings)
+        self.form.show_findings(findings)
         broken = [part.what for part in findings.values() if part.health is Health.BROKEN]
         self._problem.setText(tr("Fix first: {}.").format(", ".join(broken)) if broken else "")
         self._allow_start(is_ready(findings))
         wearer, self._starting = self._starting, None
         if wearer is not None and is_ready(findings):
-            self.start_requested.emit(self._form.settings, wearer)
+            self.start_requested.emit(self.form.settings, wearer)
 
     def _cancel_opening(self) -> None:
         self._cancel.setEnabled(False)
@@ -293,15 +278,6 @@ class NewCalibration(Card):
             self._button.isEnabled()
             and (new is None or (is_here and not isinstance(new, QAbstractButton)))
         )
-
-    def _fit_hint(self) -> None:
-        """Show the hint in a low page only where the form then needs no scrolling."""
-        area = self._scrolled
-        hint_px = self.hint.heightForWidth(self.contentsRect().width() - 4 * SPACING_PX)
-        hint_px += SPACING_PX // 2
-        room_px = area.viewport().height() + (0 if self.hint.isHidden() else hint_px)
-        form_px = self._form.heightForWidth(area.viewport().width())
-        self.hint.setVisible(not self._is_low or form_px + hint_px <= room_px)
 
     def _drop_blanks(self, typed: str) -> None:
         """Take no blanks before a name: the space bar pressed the former page's button."""
@@ -327,10 +303,7 @@ class NewCalibration(Card):
         last = hbox(
             (self._problem, 1), self._cancel, self._start_key, self._button, spacing=SPACING_PX
         )
-        self._scrolled = form = scrollable(self._form)
-        self._fit_soon = fit_soon(self._fit_hint, self)
-        self._form.changed.connect(self._fit_soon.start)
-        form.verticalScrollBar().rangeChanged.connect(lambda *_: self._fit_soon.start())
+        form = scrollable(self.form)
         # Or the page around it would scroll, and hide the button.
         form.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
         self.body.addWidget(form, 1)

@@ -18,7 +18,6 @@ from handcal.session.unfinished import UnfinishedSession, unfinished_and_repaire
 from handcal_gui.app.preferences import MOST_RECENT
 from handcal_gui.app.translation import tr
 from handcal_gui.widgets.numbers import pluralize
-from handcal_gui.widgets.sentence import with_advice
 from handcal_gui.widgets.times import local_time
 
 
@@ -75,7 +74,7 @@ def find_sessions(folder: Path, recent: Sequence[Path]) -> KnownSessions:
 
 def _unfinished(session: UnfinishedSession) -> Entry:
     if session.problem:
-        return _unreadable(session.path, session.problem)
+        return _unreadable(session.path, session.problem, session.advice)
     counts = _counts(session)
     text = _text(session.wearer, session.started, *counts)
     if not any(counts):
@@ -95,7 +94,7 @@ def _recent(path: Path) -> Entry | None:
     try:
         replayed = replay(path)
     except FileError as error:
-        return _unreadable(path, str(error))
+        return _unreadable(path, error.what, error.advice)
     state, events = replayed.state, replayed.journal.events
     alignments, trials = state.alignments, state.trials
     held = alignments.active, alignments.deleted, trials.active, trials.deleted
@@ -106,12 +105,12 @@ def _recent(path: Path) -> Entry | None:
     return Entry(path, text, wearer=state.wearer, eyes=eye_outcomes(state))
 
 
-def _unreadable(path: Path, why: str) -> Entry:
+def _unreadable(path: Path, why: str, advice: str) -> Entry:
     """Return a session that cannot be chosen, with the reason and what to do."""
     named = why.replace(str(path), path.name)
     text = named if path.name in named else f"{path.name}: {named}"
-    advice = tr("make it readable, restore it from a backup, or delete it in All sessions")
-    return Entry(path, with_advice(text, advice), is_enabled=False)
+    otherwise = tr("make it readable, restore it from a backup, or delete it in All sessions")
+    return Entry(path, f"{text}; {advice or otherwise}", is_enabled=False)
 
 
 def _text(wearer: str, started: str, alignments: int, verified: int, trials: int) -> str:

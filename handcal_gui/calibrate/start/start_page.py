@@ -6,12 +6,15 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QResizeEvent, QShowEvent
+from PySide6.QtGui import QIcon, QShowEvent
 from PySide6.QtWidgets import (
     QFileDialog,
     QGridLayout,
-    QLabel,
+    QHBoxLayout,
+    QListWidget,
+    QListWidgetItem,
     QMessageBox,
+    QPushButton,
     QSizePolicy,
     QWidget,
 )
@@ -19,23 +22,29 @@ from PySide6.QtWidgets import (
 from handcal.session.session import SessionRecord
 from handcal.station.checks.preflight import check_station
 from handcal_gui.app.preferences import CurrentPreferences, Preferences
-from handcal_gui.app.theme import SPACING_PX, font_px, scale_font
+from handcal_gui.app.theme import SPACING_PX, follow_theme, icon
 from handcal_gui.app.translation import tr
 from handcal_gui.calibrate.start.card import Card
 from handcal_gui.calibrate.start.new_calibration import Check, NewCalibration
-from handcal_gui.calibrate.start.session_entries import KnownSessions, find_sessions
-from handcal_gui.calibrate.start.session_list import SessionList
+from handcal_gui.calibrate.start.session_entries import Entry, KnownSessions, find_sessions
 from handcal_gui.engine.latest_job import LatestJob
-from handcal_gui.widgets.fields import button, plain_message
-from handcal_gui.widgets.layouts import fit_soon, hbox, scrollable, vbox
+from handcal_gui.widgets.elided_label import ElidedLabel
+from handcal_gui.widgets.error_bars import (
+    PICTURE_HELP,
+    PICTURE_LEGEND,
+    PICTURE_PX,
+    error_bars,
+    has_bars,
+    picture_text,
+)
+from handcal_gui.widgets.fields import button, paragraph, plain_message, plain_tooltip, with_name
+from handcal_gui.widgets.layouts import hbox, scrollable, vbox
 from handcal_gui.widgets.times import local_time
 
 FindOffers = Callable[[Path, Sequence[Path]], KnownSessions]
 
 _LARGEST_PX = 1600, 1000
 """Size beyond which a larger window leaves room around the page."""
-_LOW = 46
-"""Height below which the page has no head, in sizes of the font."""
 
 
 def ask_whether_worn(parent: QWidget, record: SessionRecord) -> bool | None:
@@ -70,27 +79,15 @@ class StartPage(QWidget):
 
     Attributes
     ----------
-    start_requested : Signal(StationSettings, str)
-        The settings of a station that has just passed its checks, and the wearer.
-    open_requested, resume_requested : Signal(Path)
-        The session's folder.
-    rig_wanted, connect_wanted, evaluation_wanted : Signal()
-        The user wants to calibrate a rig, to connect a headset, or to run studies and tests.
-    cancel_requested : Signal()
-        The user cancels the opening of the station.
+    new : NewCalibration
+    unfinished, recent : SessionList
+    evaluate : QPushButton
     library_requested : Signal(Path)
         The user wants to see all sessions in a folder.
     example_requested : Signal(Path)
         The user wants to open the example; the session folder to copy it to.
     """
 
-    start_requested = Signal(object, str)
-    open_requested = Signal(object)
-    resume_requested = Signal(object)
-    rig_wanted = Signal()
-    connect_wanted = Signal()
-    evaluation_wanted = Signal()
-    cancel_requested = Signal()
     example_requested = Signal(object)
     library_requested = Signal(object)
 
@@ -104,7 +101,7 @@ class StartPage(QWidget):
     ) -> None:
         super().__init__(parent)
         self.setObjectName("startPage")
-        self._recent: tuple[Path, ...] = ()
+        self._newest: tuple[Path, ...] = ()
         self._folder = Path()
         self.new = NewCalibration(preferences, pairing_key, check)
         self._resume = Card(
@@ -112,13 +109,13 @@ class StartPage(QWidget):
         )
         self._resume.setObjectName("resume")
         self._resume.hide()
-        self._unfinished = SessionList(tr("Unfinished sessions"), tr("Res&ume"))
-        self._resume.body.addWidget(self._unfinished)
+        self.unfinished = SessionList(tr("Unfinished sessions"), tr("Res&ume"))
+        self._resume.body.addWidget(self.unfinished)
         self._open = Card(
             tr("Open a session"), tr("Review it, compare methods, export it."), "folder"
         )
         self._open.setObjectName("open")
-        self._opened = SessionList(
+        self.recent = SessionList(
             tr("Recent sessions"), tr("&Open"), tr("Recent sessions will be listed here.")
         )
         example = button("example", tr("E&xample"), tr("Open the example session"))
@@ -128,36 +125,28 @@ class StartPage(QWidget):
             "library", tr("All sess&ions…"), tr("Search, compare, export and repair sessions")
         )
         for added in (browse, example):
-            self._opened.add_button(added)
-        self._open.body.addWidget(self._opened, 1)
+            self.recent.add_button(added)
+        self._open.body.addWidget(self.recent, 1)
         self._open.add_to_head(library)
         self._evaluate = Card(
             tr("Evaluate"), tr("Simulated studies, the cube test, and the user test."), "results"
         )
-        evaluate = button(
+        self.evaluate = button(
             "evaluate", tr("Evalua&te…"), help_text=tr("Measure the accuracy of calibrations")
         )
-        self._evaluate.add_to_head(evaluate)
-        self._fit_soon = fit_soon(self._fit, self)
+        self._evaluate.add_to_head(self.evaluate)
         self._lay_out()
         self._find = LatestJob(lambda question: find_sessions(*question), self)
         self._find.answered.connect(self._show_sessions)
-        self.new.start_requested.connect(self.start_requested)
-        self.new.rig_wanted.connect(self.rig_wanted)
-        self.new.connect_wanted.connect(self.connect_wanted)
-        self.new.cancel_requested.connect(self.cancel_requested)
-        self.new.changed.connect(self._look_in_another_folder)
-        self._unfinished.chosen.connect(self.resume_requested)
-        self._opened.chosen.connect(self.open_requested)
+        self.new.form.changed.connect(self._look_in_another_folder)
         browse.clicked.connect(self.browse)
         example.clicked.connect(lambda: self.example_requested.emit(self._folder))
         library.clicked.connect(lambda: self.library_requested.emit(self._folder))
-        evaluate.clicked.connect(self.evaluation_wanted)
         self.show_preferences(preferences)
 
     def show_preferences(self, preferences: Preferences) -> None:
         """Show the preferences, for the next wearer."""
-        self._recent = tuple(map(Path, preferences.sessions))
+        self._newest = tuple(map(Path, preferences.sessions))
         self.new.show_preferences(preferences)
         self.look_for_sessions()
 
@@ -184,7 +173,7 @@ class StartPage(QWidget):
         """Let the user choose the folder of a session to open."""
         folder = QFileDialog.getExistingDirectory(self, tr("Session folder"), str(self._folder))
         if folder:
-            self.open_requested.emit(Path(folder))
+            self.recent.chosen.emit(Path(folder))
 
     def stop(self) -> None:
         """Wait for background work to end; called before the program ends."""
@@ -196,16 +185,6 @@ class StartPage(QWidget):
         super().showEvent(event)
         self.look_for_sessions()
 
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Leave out texts that only greet, where the form needs their room."""
-        super().resizeEvent(event)
-        self._fit_soon.start()
-
-    def _fit(self) -> None:
-        is_low = self.height() < _LOW * font_px()
-        self._head.setVisible(not is_low)
-        self.new.fit(is_low=is_low)
-
     def _look_in_another_folder(self) -> None:
         if self.new.settings.sessions_path != self._folder:
             self.look_for_sessions()
@@ -213,19 +192,18 @@ class StartPage(QWidget):
     def look_for_sessions(self) -> None:
         """Search for sessions again."""
         self._folder = self.new.settings.sessions_path
-        self._find.ask((self._folder, self._recent))
+        self._find.ask((self._folder, self._newest))
 
     def _show_sessions(self, _question: object, offers: KnownSessions) -> None:
-        self._unfinished.show_entries(offers.unfinished)
+        self.unfinished.show_entries(offers.unfinished)
         self._resume.setVisible(bool(offers.unfinished))
-        self._opened.show_entries(offers.recent)
+        self.recent.show_entries(offers.recent)
         self.new.show_wearers(offers.wearers)
 
     def _lay_out(self) -> None:
-        title = QLabel("handcal")
-        scale_font(title, 1.6, is_bold=True)
         cards = QWidget()
-        parts = (self._resume, 1), (self._open, 1), self._evaluate
+        # Below the others, so that nothing moves under the mouse when it appears.
+        parts = (self._open, 1), self._evaluate, (self._resume, 1)
         vbox(*parts, on=cards, margins=0, spacing=2 * SPACING_PX)
         right = scrollable(cards)  # or a small window hides the button that starts
         right.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
@@ -240,10 +218,104 @@ class StartPage(QWidget):
         grid.setSpacing(2 * SPACING_PX)
         grid.setColumnStretch(1, 3)
         grid.setColumnStretch(2, 2)
-        hint = QLabel(tr("Calibrate a see-through headset with the wearer's bare hand."))
-        self._head = QWidget()
-        hbox(title, hint, 0, on=self._head, margins=0, spacing=2 * SPACING_PX)
-        grid.addWidget(self._head, 0, 1, 1, 2)
-        grid.addWidget(self.new, 1, 1)
-        grid.addWidget(right, 1, 2)
-        grid.setRowStretch(1, 1)
+        grid.addWidget(self.new, 0, 1)
+        grid.addWidget(right, 0, 2)
+
+
+class SessionList(QWidget):
+    """Lists sessions; a double click, Enter, or the button below chooses one.
+
+    Parameters
+    ----------
+    name : str
+        For screen readers, such as "Unfinished sessions".
+    verb : str
+        Label of the button.
+    empty : str
+        Text shown if the list is empty.
+
+    Attributes
+    ----------
+    chosen : Signal(Path)
+    """
+
+    chosen = Signal(object)
+
+    def __init__(
+        self, name: str, verb: str, empty: str = "", parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._list = with_name(QListWidget(), "sessions", name)
+        self._list.setWordWrap(True)
+        # As tall as the available space, not as the items need.
+        self._list.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
+        self._list.setMinimumHeight(6 * SPACING_PX)  # two rows, or one of two lines
+        self._list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._list.setAlternatingRowColors(True)
+        self._list.setIconSize(PICTURE_PX)
+        self._button = button("choose", verb)
+        self._list.itemActivated.connect(self._choose)
+        self._list.currentItemChanged.connect(self._refresh)
+        self._button.clicked.connect(self._choose)
+        self._empty = paragraph("empty", empty)
+        self._empty.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self._layout = vbox(
+            (self._empty, 1), (self._list, 1), on=self, margins=0, spacing=SPACING_PX // 2
+        )
+        self._legend = with_name(ElidedLabel(), "legend")
+        self._legend.setText(PICTURE_LEGEND)
+        self._legend.setToolTip(PICTURE_HELP)
+        self._buttons = QHBoxLayout()
+        self._buttons.addWidget(self._legend, 1)
+        self._buttons.addStretch()
+        self._buttons.addWidget(self._button)
+        self._layout.addLayout(self._buttons)
+        self._entries: Sequence[Entry] = ()
+        follow_theme(self, lambda: self.show_entries(self._entries))
+
+    def show_entries(self, entries: Sequence[Entry]) -> None:
+        """Replace the entries, keeping the selection if it is still listed and none is newer."""
+        before, self._entries = {entry.path for entry in self._entries}, entries
+        has_pictures = any(has_bars(entry.eyes) for entry in entries)
+        kept = self._list.currentItem()
+        kept_path = kept.data(Qt.ItemDataRole.UserRole) if kept is not None else None
+        newest = next((entry.path for entry in entries if entry.is_enabled), None)
+        if newest not in before:
+            kept_path = newest
+        self._list.clear()
+        self._list.setVisible(bool(entries))
+        self._empty.setVisible(not entries)
+        self._legend.setVisible(has_pictures)
+        for entry in entries:
+            item = QListWidgetItem(entry.text)
+            item.setData(Qt.ItemDataRole.UserRole, entry.path)
+            why = "" if entry.is_enabled else entry.text  # of which a small list shows a part
+            about = "\n".join(filter(None, (str(entry.path), why, picture_text(entry.eyes))))
+            item.setToolTip(plain_tooltip(about))
+            item.setData(Qt.ItemDataRole.AccessibleDescriptionRole, picture_text(entry.eyes))
+            if has_pictures:
+                item.setIcon(QIcon(error_bars(entry.eyes)))
+            if not entry.is_enabled:
+                item.setFlags(Qt.ItemFlag.ItemIsEnabled)
+                item.setIcon(icon("warning"))
+            self._list.addItem(item)
+            if entry.is_enabled and (self._list.currentItem() is None or entry.path == kept_path):
+                self._list.setCurrentItem(item)
+        self._refresh()
+
+    def add_button(self, added: QPushButton) -> None:
+        """Add a button before the list's own; the legend then has a line of its own."""
+        self._layout.insertWidget(2, self._legend)
+        self._buttons.insertWidget(1, added)
+
+    def _choose(self) -> None:
+        item = self._list.currentItem()
+        if _may_be_chosen(item):
+            self.chosen.emit(item.data(Qt.ItemDataRole.UserRole))
+
+    def _refresh(self) -> None:
+        self._button.setEnabled(_may_be_chosen(self._list.currentItem()))
+
+
+def _may_be_chosen(item: QListWidgetItem | None) -> bool:
+    return item is not None and bool(item.flags() & Qt.ItemFlag.ItemIsSelectable)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSize
-from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QCheckBox, QHBoxLayout, QLabel, QWidget
+from PySide6.QtWidgets import QCheckBox, QLabel, QWidget
 
 from handcal.core.types import EYES, Eye
 from handcal.station.snapshot import Snapshot
@@ -79,40 +77,11 @@ class WearerViewPanel(QWidget):
             entry.show_on_image(has_image)
         show_alike([column.canvas for column in self._eyes.values()])
 
-    def minimumSizeHint(self) -> QSize:
-        """Return that of eyes side by side: where there is little height, they stand so."""
-        size = super().minimumSizeHint()
-        if self._both.direction() is QBoxLayout.Direction.TopToBottom:
-            one_px = self._eyes["left"].minimumSizeHint().height()
-            size.setHeight(size.height() - one_px - self._both.spacing())
-        return size
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Place the eyes side by side, or one below the other if that makes them larger."""
-        super().resizeEvent(event)
-        column = self._eyes["left"]
-        texts_px = column.minimumSizeHint().height() - column.canvas.minimumHeight()
-        height_px = self.height() - _OPTIONS_EMS * self.fontMetrics().height()
-        beside_px = min(self.width() / 2, _SHAPE * (height_px - texts_px))
-        below_px = min(self.width(), _SHAPE * (height_px / 2 - texts_px))
-        directions = QBoxLayout.Direction
-        self._both.setDirection(
-            directions.TopToBottom if below_px > beside_px else directions.LeftToRight
-        )
-
     def _lay_out(self, whole: QCheckBox, before: QCheckBox) -> None:
-        options, legend = QHBoxLayout(), QHBoxLayout()
-        self._both = QBoxLayout(QBoxLayout.Direction.LeftToRight)
-        for row in (options, self._both, legend):
-            row.setSpacing(SPACING_PX)
-        options.addWidget(whole)
-        options.addWidget(before)
-        options.addStretch()
-        for column in self._eyes.values():
-            self._both.addWidget(column, 1)
-        for entry in self._entries.values():
-            legend.addWidget(entry)
-        vbox(options, (self._both, 1), legend, on=self, margins=SPACING_PX, spacing=SPACING_PX)
+        both = hbox(*((column, 1) for column in self._eyes.values()), spacing=SPACING_PX)
+        legend = hbox(*self._entries.values(), spacing=SPACING_PX)
+        options = hbox(whole, before, 0, spacing=SPACING_PX)
+        vbox(options, (both, 1), legend, on=self, margins=SPACING_PX, spacing=SPACING_PX)
 
 
 class _EyeColumn(QWidget):

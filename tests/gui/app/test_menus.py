@@ -19,6 +19,7 @@ from handcal_gui.app.program import Program
 from handcal_gui.calibrate.window import MainWindow
 from handcal_gui.library.window import LibraryWindow
 from handcal_gui.widgets.table import Table
+from tests.gui.calibrate.conftest import Engine
 from tests.gui.helpers import child
 
 
@@ -41,7 +42,7 @@ def offered(window: MainWindow) -> dict[str, QAction]:
 
 
 def test_what_can_be_deleted_and_restored_in_a_panel_is_offered(
-    qtbot: QtBot, window: MainWindow, record: SessionRecord, results: Results
+    window: MainWindow, record: SessionRecord, results: Results
 ) -> None:
     assert not offered(window)
     window.show_page("live")
@@ -49,15 +50,14 @@ def test_what_can_be_deleted_and_restored_in_a_panel_is_offered(
     session.show_record(record, results)
     window.go_to("session")
     child(session, Table, "alignments").selectRow(1)
-    with qtbot.waitSignal(session.delete_requested) as asked:
-        offered(window)["Delete: Session\tDel"].trigger()
-    assert asked.args == ["alignment", 2]
+    session.submit = engine = Engine()
+    offered(window)["Delete: Session\tDel"].trigger()
+    engine.station.delete.assert_called_once_with("alignment", 2)
     with Session(record.path) as stored:
         stored.delete("alignment", 2)
     session.show_record(Session.open(record.path), None)
-    with qtbot.waitSignal(session.restore_requested) as asked:
-        offered(window)["Undo: Session\tCtrl+Z"].trigger()
-    assert asked.args == ["alignment", 2]
+    offered(window)["Undo: Session\tCtrl+Z"].trigger()
+    engine.station.restore.assert_called_once_with("alignment", 2)
     window.show_page("start")
     assert not offered(window)
 
@@ -66,9 +66,9 @@ def test_results_are_copied_once_there_are_some(
     window: MainWindow, record: SessionRecord, results: Results
 ) -> None:
     window.show_page("review")
-    window.panels.results.show_results(results, record.alignments)
+    window.panels.results.show_results(results, record, 8.0)
     assert [text.partition("\t")[0] for text in offered(window)] == ["Copy: Results"]
-    window.panels.results.show_results(None, {})
+    window.panels.results.show_results(None, None)
     assert not offered(window)
 
 

@@ -361,7 +361,7 @@ def resume_and_quit(display: Display, session: Path, preferences: Path) -> None:
         window.end_well()
 
 
-@pytest.mark.slow  # tests/gui/app/autopilot/test_demonstration.py covers all but the X server
+@pytest.mark.slow  # tests/gui/app/test_autopilot.py covers all but the X server
 def test_the_autopilot_calibrates_exports_and_takes_pictures(
     display: Display, tmp_path: Path, preferences: Path
 ) -> None:

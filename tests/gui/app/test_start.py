@@ -100,10 +100,10 @@ def test_without_a_display(
 ) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"):
         monkeypatch.delenv(name, raising=False)
-    assert "handcal demo" in complaint(capsys, monkeypatch, code=1)
+    assert "handcal demo" in complaint(capsys, monkeypatch, code=2)
     monkeypatch.setenv("DISPLAY", ":4711")
     assert "cannot connect to the X server at DISPLAY=:4711" in complaint(
-        capsys, monkeypatch, code=1
+        capsys, monkeypatch, code=2
     )
 
 

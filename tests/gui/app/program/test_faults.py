@@ -82,7 +82,7 @@ def test_a_silent_headset_is_reported_and_sending_repeated(live: Technician, stu
     assert live.child(QLabel, "wizardNote").text() == "", "it is said once"
     assert live.snapshot.observation is not None
     assert live.snapshot.observation.problem == "the headset sends no poses"
-    live.program.window.docks["link"].raise_()
+    live.program.window.go_to("link")
     state = live.child(QLabel, "link-state")
     live.wait(lambda: state.text().startswith("No headset is connected"))
     studio.headset.come_back()
@@ -149,7 +149,7 @@ def test_data_not_written_yet_are_left_only_on_request(
     studio.headset.confirm()
     live.wait(lambda: "cannot write" in live.banner)
     window = live.program.window
-    next_wearer = live.program.live.next_wearer_requested.emit
+    next_wearer = live.program.live.on[Action.NEXT_WEARER]
     leave_now: Callable[[], object] = window.close if leave == "close" else next_wearer
     leave_now()
     assert "cannot write" in asked[0].lower()
@@ -176,7 +176,7 @@ def test_notes_that_cannot_be_saved_are_left_only_on_request(
     technician.program.start_calibration(replace(studio.settings, sessions=str(folder)), "Ada")
     technician.wait_for_page("live")
     window = technician.program.window
-    window.docks["session"].raise_()
+    window.go_to("session")
     notes = technician.child(QPlainTextEdit, "")
     technician.wait(notes.isEnabled)
     path = technician.snapshot.session_path
@@ -201,7 +201,7 @@ def test_notes_are_saved_once_they_can_be(
     technician = open_program()
     technician.program.start_calibration(studio.settings, "Ada")
     technician.wait_for_page("live")
-    technician.program.window.docks["session"].raise_()
+    technician.program.window.go_to("session")
     notes = technician.child(QPlainTextEdit, "")
     technician.wait(notes.isEnabled)
     path = technician.snapshot.session_path
@@ -239,7 +239,7 @@ def test_a_signal_ends_the_program_while_it_asks(
     asking.timeout.connect(end_once_it_asks)
     asking.start()
     leave_now: Callable[[], object] = (
-        program.window.close if leave == "close" else program.live.next_wearer_requested.emit
+        program.window.close if leave == "close" else program.live.on[Action.NEXT_WEARER]
     )
     leave_now()
     live.wait(lambda: not program.window.isVisible())
@@ -250,7 +250,7 @@ def test_notes_outlive_an_engine_that_breaks_down(
     live: Technician, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = live.snapshot.session_path
-    live.program.window.docks["session"].raise_()
+    live.program.window.go_to("session")
     live.wait(lambda: live.child(QPlainTextEdit, "").isEnabled())
     live.child(QPlainTextEdit, "").setPlainText("wears glasses")
 

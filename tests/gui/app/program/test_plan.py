@@ -120,9 +120,9 @@ def test_each_step_of_a_held_plan_is_taken_by_a_press(technician: Technician, st
     technician.wait(lambda: technician.can(Action.ANOTHER))
     assert technician.record.facts.verified == {}
     session = technician.program.window.panels.session
-    session.delete_requested.emit("alignment", 1)
+    session.submit("delete the alignment", lambda s: s.delete("alignment", 1))
     technician.wait(lambda: not technician.snapshot.record.alignments)
-    session.restore_requested.emit("alignment", 1)
+    session.submit("restore the alignment", lambda s: s.restore("alignment", 1))
     technician.wait(lambda: technician.can(Action.TAKE_STEP))  # not waiting for a hand for good
     for state in (State.SOLVED, State.APPLIED):
         technician.press_space_for(Action.TAKE_STEP)

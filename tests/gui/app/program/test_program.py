@@ -110,14 +110,14 @@ def test_alignments_are_deleted_and_restored(live: Technician, studio: Any) -> N
     align(live, studio)
     solve_and_apply(live)
     session = live.program.window.panels.session
-    session.delete_requested.emit("alignment", 1)
+    session.submit("delete the alignment", lambda s: s.delete("alignment", 1))
     live.wait(lambda: live.snapshot.record.alignments == {})
     assert live.snapshot.procedure.results is None
-    session.restore_requested.emit("alignment", 1)
+    session.submit("restore the alignment", lambda s: s.restore("alignment", 1))
     live.wait(lambda: len(live.snapshot.record.alignments) == 1)
     live.press_space_to("Solve")
     live.wait_for_state(State.SOLVED)
-    session.delete_requested.emit("alignment", 7)
+    session.submit("delete the alignment", lambda s: s.delete("alignment", 7))
     live.wait(lambda: live.banner.startswith("Could not delete the alignment: "))
     QTest.keyClick(live.program.window, Qt.Key.Key_Escape)
     assert live.banner == ""
@@ -135,7 +135,7 @@ def test_fine_tuning_streams_is_recorded_and_judged_by_trials(
     before = studio.headset.shown.projections["left"].P
     QTest.keyClick(window, Qt.Key.Key_T)
     live.wait(lambda: live.banner.startswith("The trial is not recorded yet: φ of the left eye"))
-    window.docks["fine_tune"].raise_()
+    window.go_to("fine_tune")
     panel = window.panels.fine_tune
     panel.setFocus()
     live.wait(lambda: panel.isVisible() and "In the headset" in live.child(QLabel, "status").text())
@@ -156,24 +156,33 @@ def test_fine_tuning_streams_is_recorded_and_judged_by_trials(
     np.testing.assert_allclose(tuned["left"], solved_m + np.array([step_m, 0.0, 0.0]))
     assert sum(event.name == "fine_tuned" for event in live.record.events) == 1
 
-    [shows_target] = window.panels.trials.findChildren(QCheckBox)
+    QTest.keyClick(window, Qt.Key.Key_T)  # without a target, too
+    live.wait(lambda: len(live.snapshot.record.trials) == 1)
+    live.wait(lambda: np.array_equal(studio.headset.shown.projections["left"].P, before))
+    shows_target, _ = window.panels.trials.findChildren(QCheckBox)
     shows_target.click()
     live.wait(lambda: studio.headset.shown.target is not None)
     target = studio.headset.shown.target
     assert target.eye == "left"
-
+    recorded = sum(event.name == "fine_tuned" for event in live.record.events)
+    QTest.keyClick(panel, Qt.Key.Key_Left)
+    live.wait(lambda: not np.array_equal(studio.headset.shown.projections["left"].P, before))
     QTest.keyClick(window, Qt.Key.Key_T)
-    live.wait(lambda: len(live.snapshot.record.trials) == 1)
+    live.wait(lambda: len(live.snapshot.record.trials) == 2)
     live.wait(lambda: live.banner == "")
-    (trial,) = live.snapshot.record.trials.values()
-    t_C0_V_m = live.snapshot.record.rig.eyes["left"].t_C0_V_m
-    np.testing.assert_allclose(target.corners_V_m + t_C0_V_m, trial.corners_E_m)
     # It would be the right eye's turn, which has not been aligned: the left one has another.
-    assert studio.headset.shown.target is not None
-    assert window.panels.trials.record_action.isEnabled()
-    np.testing.assert_allclose(trial.adjusted_shift_m - trial.calibrated_shift_m, [step_m, 0, 0])
-    assert trial.eye == "left"
-    assert trial.error_px.min() > 0.0
+    first, second = live.snapshot.record.trials.values()
+    t_C0_V_m = live.snapshot.record.rig.eyes["left"].t_C0_V_m
+    np.testing.assert_allclose(target.corners_V_m + t_C0_V_m, second.corners_E_m)
+    for trial in (first, second):
+        moved_m = trial.adjusted_shift_m - trial.calibrated_shift_m
+        np.testing.assert_allclose(moved_m, [step_m, 0, 0], atol=1e-12)
+        assert trial.error_px.min() > 0.0
+    # Neither has moved the calibration.
+    live.wait(lambda: np.array_equal(studio.headset.shown.projections["left"].P, before))
+    stored = Session.open(live.snapshot.session_path)
+    np.testing.assert_allclose(stored.applied_shift_m["left"], solved_m)
+    assert sum(event.name == "fine_tuned" for event in stored.events) == recorded
 
 
 def test_fine_tuning_that_comes_into_sight_begins_with_what_the_headset_has(
@@ -192,10 +201,10 @@ def test_fine_tuning_that_comes_into_sight_begins_with_what_the_headset_has(
 def test_notes_and_shifts_of_the_last_moment_are_saved(live: Technician, studio: Any) -> None:
     path = live.snapshot.session_path
     window = live.program.window
-    window.docks["session"].raise_()
+    window.go_to("session")
     live.wait(lambda: live.child(QPlainTextEdit, "").isEnabled())
     live.child(QPlainTextEdit, "").setPlainText("wears glasses")
-    window.docks["fine_tune"].raise_()
+    window.go_to("fine_tune")
     panel = window.panels.fine_tune
     live.wait(lambda: panel.isVisible() and panel.isEnabled())
     panel.setFocus()
@@ -273,7 +282,7 @@ def test_an_interrupted_session_is_offered_and_resumed(
 
     second = open_program()
     second.wait(second.child(QWidget, "resume").isVisible)
-    second.program.start.resume_requested.emit(path)
+    second.program.start.unfinished.chosen.emit(path)
     second.wait_for_page("live")
     assert second.snapshot.session_path == path
     assert second.snapshot.procedure.state is State.ALIGNED
@@ -307,7 +316,7 @@ def test_nothing_is_lost_by_closing_at_work(
         first.press_space_to("Verify the left eye")
         first.wait_for_state(State.VERIFY)
     if moment == "recording a trial":
-        first.program.window.panels.trials.trial_requested.emit("left", 1.0)
+        first.program.window.panels.trials.submit("trial", lambda s: s.trials.save("left", 1.0))
     path = first.snapshot.session_path
     first.program.window.close()
 
@@ -329,7 +338,7 @@ def test_a_headset_that_was_off_is_verified_first_and_nothing_is_fused(
     align(live, studio)
     solve_and_apply(live)
     before = live.snapshot
-    live.program.live.next_wearer_requested.emit()
+    live.program.live.do(Action.NEXT_WEARER)
     live.wait_for_page("start")
     if why == "taken off":
         monkeypatch.setattr("handcal_gui.app.program.ask_whether_worn", lambda *_: False)
@@ -387,9 +396,9 @@ def test_a_session_resumed_at_once_is_fine_tuned_from_its_phi(
     applied_m, path = live.snapshot.procedure.applied_shift_m["left"], live.snapshot.session_path
     live.wait(lambda: is_shown(applied_m))
     if compares:
-        panels.trials.compare_requested.emit()
+        panels.trials.submit("compare", lambda s: s.trials.compare())
         live.wait(lambda: live.snapshot.comparing is not None)
-    live.program.live.next_wearer_requested.emit()
+    live.program.live.do(Action.NEXT_WEARER)
     live.wait_for_page("start")
     live.program.resume_session(path)
     live.wait_for_page("live")

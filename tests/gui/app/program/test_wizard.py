@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QComboBox, QLabel, QPlainTextEdit, QPushButton
 
 from handcal.calibration.states import State
 from handcal_gui.app.preferences import PreferencesFile
-from handcal_gui.calibrate.cloud.cloud_view import CloudView
+from handcal_gui.calibrate.cloud.panel import CloudView
 from handcal_gui.calibrate.guide.view import Action
 from tests.gui.app.program.technician import (
     Technician,

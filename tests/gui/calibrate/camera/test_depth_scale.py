@@ -5,7 +5,7 @@ import pytest
 from pytestqt.qtbot import QtBot
 
 from handcal.core.types import UInt8
-from handcal_gui.calibrate.camera.depth_scale import DepthColors, DepthLegend
+from handcal_gui.calibrate.camera.panel import DepthColors, DepthLegend
 
 GATE_M = (0.35, 0.70)
 

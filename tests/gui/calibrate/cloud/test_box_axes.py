@@ -4,8 +4,8 @@ from PySide6.QtCore import QPointF
 from PySide6.QtGui import QColor, QImage, QPainter
 from pytestqt.qtbot import QtBot
 
-from handcal_gui.calibrate.cloud.box_axes import Box, draw_box, draw_scale
 from handcal_gui.calibrate.cloud.orbit import Direction, Orbit
+from handcal_gui.calibrate.cloud.panel import Box, draw_box, draw_scale
 
 SIZE = 400
 

@@ -14,9 +14,8 @@ from handcal.register.results import Results
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.preferences import HIDDEN_LAYERS
 from handcal_gui.app.theme import colors
-from handcal_gui.calibrate.cloud.cloud_view import CloudView
 from handcal_gui.calibrate.cloud.orbit import Direction
-from handcal_gui.calibrate.cloud.panel import CloudPanel
+from handcal_gui.calibrate.cloud.panel import CloudPanel, CloudView
 from handcal_gui.calibrate.parts.legend import LegendEntry
 from handcal_gui.calibrate.parts.residual_scale import OUTLIER, ResidualScale, residual_colors
 from handcal_gui.calibrate.parts.splat import rgb

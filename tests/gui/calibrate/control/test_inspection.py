@@ -51,9 +51,9 @@ def test_one_window_at_a_time_is_open_until_the_program_closes(
 
     monkeypatch.setattr(inspection, "inspect_session", show)
     open_session(program, qtbot, record)
-    program.window.panels.session.inspect_requested.emit()
+    program.window.panels.session.inspect_button.click()
     qtbot.waitUntil(lambda: len(shown) == 1, timeout=PATIENCE_MS)
-    program.window.panels.session.inspect_requested.emit()
+    program.window.panels.session.inspect_button.click()
     qtbot.waitUntil(lambda: len(shown) == 2, timeout=PATIENCE_MS)
     assert closed.acquire(timeout=0)
     assert not closed.acquire(timeout=0)

@@ -17,6 +17,7 @@ from handcal.station.snapshot import Snapshot
 from handcal_gui.app.preferences import PreferencesFile
 from handcal_gui.app.program import Program
 from handcal_gui.calibrate.guide.view import Action
+from handcal_gui.calibrate.sections import TITLES
 from handcal_gui.engine.engine_thread import EngineThread
 from tests.gui.views import begun
 
@@ -36,7 +37,7 @@ class Stream:
 
     def __init__(self, program: Program, snapshot: MakeSnapshot, patch: pytest.MonkeyPatch) -> None:
         self.polled: list[Snapshot] = []
-        self.shown: dict[str, list[Snapshot]] = {name: [] for name in program.window.docks}
+        self.shown: dict[str, list[Snapshot]] = {name: [] for name in TITLES}
         self.rate_hz = 30
         self._make = snapshot
         self._now_ns = self._number = 0
@@ -47,7 +48,9 @@ class Stream:
             patch.setattr(getattr(panels, name), "show_snapshot", shown.append)
         engine = Mock(spec=EngineThread, newest=lambda: (self._newest, 0), submit=lambda *_: 0)
         patch.setattr(self._controller, "_engine", engine)
-        patch.setattr(self._controller, "_visible", set(panels.all()))
+        self.is_visible = True
+        for panel in (*panels.all(), program.wizard_panel.picture):
+            patch.setattr(panel, "isVisible", lambda: self.is_visible)
         patch.setattr(
             "handcal_gui.calibrate.control.live.time",
             SimpleNamespace(monotonic_ns=lambda: self._now_ns),
@@ -132,7 +135,7 @@ def test_a_late_frame_is_shown_once_with_the_newest_hand(stream: Stream) -> None
 
 
 def test_a_hidden_link_panel_keeps_its_history(stream: Stream) -> None:
-    stream._controller._visible.clear()
+    stream.is_visible = False
     stream.see(0.0)
     assert len(stream.shown["link"]) == 1
     assert not stream.shown["session"]

@@ -20,8 +20,13 @@ from handcal.core.display import DrawnMove, effect_at
 from handcal.core.types import EYES, Rig, Verdict
 from handcal.register.results import Results
 from handcal.station.snapshot import Snapshot
-from handcal_gui.calibrate.fine_tune.panel import FineTunePanel
-from handcal_gui.calibrate.fine_tune.stream import PERIOD_MS, SETTLE_MS, Shifts, is_same_shifts
+from handcal_gui.calibrate.fine_tune.panel import (
+    PERIOD_MS,
+    SETTLE_MS,
+    FineTunePanel,
+    Shifts,
+    is_same_shifts,
+)
 from tests.gui.calibrate.conftest import Engine
 from tests.gui.calibrate.fine_tune.controls import Show, action, editor, field, fields_mm, status
 from tests.gui.helpers import text

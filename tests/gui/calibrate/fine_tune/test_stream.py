@@ -10,7 +10,7 @@ from pytestqt.qtbot import QtBot
 from handcal.calibration.states import State
 from handcal.core.types import EYES
 from handcal.station.snapshot import Snapshot
-from handcal_gui.calibrate.fine_tune.stream import (
+from handcal_gui.calibrate.fine_tune.panel import (
     PERIOD_MS,
     SETTLE_MS,
     Arrival,

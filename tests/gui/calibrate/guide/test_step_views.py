@@ -11,15 +11,26 @@ import pytest
 from handcal.calibration.states import CalibrationSettings, State
 from handcal.calibration.verifying import VerifyingView
 from handcal.core.errors import FileError
-from handcal.core.types import Eye, VerdictName, Verification
+from handcal.core.types import EYES, Eye, VerdictName, Verification
 from handcal.hand.settings import SegmentSettings
 from handcal.link.nudges import NudgeSum
+from handcal.register.results import results_json
+from handcal.register.verdict_words import VERDICT_WORDS
 from handcal.session.session import SessionRecord
-from handcal_gui.calibrate.guide.preconditions import hand_found
-from handcal_gui.calibrate.guide.step_views import connect_view, distance, save_view
-from handcal_gui.calibrate.guide.steps import Wizard
+from handcal.station.snapshot import Snapshot
+from handcal_gui.calibrate.guide.steps import Wizard, connect_view, distance, hand_found, save_view
 from handcal_gui.calibrate.guide.view import Action, ButtonSpec, Precondition, Step
-from tests.gui.views import NUDGED, VERIFIED, Maker, actions, begun, judged, tried, with_target
+from tests.gui.views import (
+    NUDGED,
+    VERIFIED,
+    Maker,
+    actions,
+    begun,
+    fine_tuned,
+    judged,
+    tried,
+    with_target,
+)
 
 
 @pytest.mark.parametrize(
@@ -127,14 +138,17 @@ def test_only_an_accepted_eye_is_ticked(snapshot: Maker) -> None:
         ]
 
 
-@pytest.mark.parametrize("name", ["implausible", "contradicted"])
+NOT_USED: list[VerdictName] = ["implausible", "contradicted"]
+
+
+@pytest.mark.parametrize("name", NOT_USED)
 def test_of_a_result_that_must_not_be_used_the_offline_calibration_is_kept(
     snapshot: Maker, name: VerdictName
 ) -> None:
     view = begun(is_held=True).view(judged(snapshot, "accept", name, State.SOLVED))
     assert view.sentence == (
-        "Send the left eye's projection; the right eye keeps the offline calibration, because its "
-        f"result is {name}. The wearer may lower the hand."
+        "Send the left eye's projection; the right eye keeps the offline calibration: its result "
+        f"is {VERDICT_WORDS[name].lower()}. The wearer may lower the hand."
     )
     assert view.main == ButtonSpec(Action.TAKE_STEP, "Send left eye")
     assert actions(view) == [Action.REDO]
@@ -149,7 +163,7 @@ def test_of_a_result_that_must_not_be_used_the_offline_calibration_is_kept(
     ("name", "main"),
     [
         ("implausible", ButtonSpec(Action.ANOTHER, "Add alignment")),
-        ("contradicted", ButtonSpec(Action.NEXT, "Finish")),
+        ("contradicted", ButtonSpec(Action.FINISH, "Finish")),
     ],
 )
 def test_after_one_eye_that_must_not_be_used_the_next_step_repeats_or_ends(
@@ -160,7 +174,6 @@ def test_after_one_eye_that_must_not_be_used_the_next_step_repeats_or_ends(
     view = begun().view(judged(snapshot, name, name, State.APPLIED, record=one))
     assert view.sentence.startswith("Do not use this result.")
     assert view.main == main
-    assert "offline calibration for both eyes" in view.fact
 
 
 @pytest.mark.parametrize(
@@ -267,7 +280,7 @@ def test_a_result_that_trials_contradict_is_not_finished_at_once(snapshot: Maker
     full = replace(accepted, not_stored="the disk is full")
     assert begun().view(full).main == ButtonSpec(Action.NEXT, "Finish")
     seen = tried(accepted)
-    assert begun().view(seen).main == ButtonSpec(Action.NEXT, "Finish as it is")
+    assert begun().view(seen).main == ButtonSpec(Action.FINISH, "Finish as it is")
     assert save_view(seen).sentence.startswith("Trials of the left eye are over the target. Go")
     finished = replace(seen, record=replace(seen.record, is_finished=True))
     said = save_view(finished).sentence
@@ -277,14 +290,96 @@ def test_a_result_that_trials_contradict_is_not_finished_at_once(snapshot: Maker
     assert save_view(mild).sentence.startswith("Everything is already saved.")
 
 
-def test_a_kept_offline_calibration_is_named_and_not_unearned(snapshot: Maker) -> None:
+def test_a_result_no_better_than_before_can_be_used_anyway_or_verified_again(
+    snapshot: Maker,
+) -> None:
     kept = judged(snapshot, "accept", "keep", State.APPLIED)
-    told = "The headset uses the offline calibration for the right eye: φ is 0 there."
-    assert save_view(kept).fact == told
-    assert not save_view(kept).unearned
+    kept = replace(kept, record=applied_record(kept))
     view = begun().view(kept)
-    assert (view.step, view.fact) == (Step.VERIFY, told)
-    assert not save_view(judged(snapshot, "accept", "accept", State.APPLIED)).fact
+    assert actions(view) == [Action.USE_ANYWAY, Action.VERIFY_RIGHT, Action.ANOTHER]
+    assert save_view(kept).unearned == {Step.VERIFY}, "not every eye is good"
+    finished = replace(kept, record=replace(kept.record, is_finished=True))
+    assert "not used for the right eye" in save_view(finished).sentence
+    results = kept.procedure.results
+    assert results is not None
+    solved_m = {eye: shift.shift_m for eye, shift in results.eyes.items()}
+    used = replace(kept, record=fine_tuned(kept.record, solved_m))
+    used = replace(used, record=replace(used.record, applied_shift_m=solved_m))
+    assert actions(begun().view(used))[0] is Action.KEEP_OFFLINE
+    good = judged(snapshot, "accept", "accept", State.APPLIED)
+    assert not {Action.USE_ANYWAY, Action.KEEP_OFFLINE} & {*actions(begun().view(good))}
+    assert not save_view(good).unearned
+
+
+def test_what_the_headset_draws_for_the_moment_is_said(snapshot: Maker) -> None:
+    seen = judged(snapshot, "accept", "accept", State.APPLIED)
+    seen = replace(seen, record=applied_record(seen))
+    assert begun().view(seen).fact == ""
+    moved_m = {**seen.procedure.applied_shift_m, "left": np.full(3, 0.009)}
+    trial = replace(
+        seen, trial_eye="left", procedure=replace(seen.procedure, applied_shift_m=moved_m)
+    )
+    assert begun().view(trial).fact == (
+        "The headset draws the left eye with another φ for the moment: it is moved for a trial."
+    )
+    back_m = {eye: np.zeros(3) for eye in EYES}
+    back = replace(
+        seen,
+        record=replace(seen.record, applied_shift_m=back_m, fine_tuned=back_m),
+        procedure=replace(
+            seen.procedure,
+            applied_shift_m=back_m,
+            former_shift_m=seen.procedure.applied_shift_m,
+        ),
+    )
+    assert begun().view(back).fact == "Press G to return to the newest φ."
+
+
+def applied_record(seen: Snapshot) -> SessionRecord:
+    """Return the record of a session whose results were applied."""
+    results = seen.procedure.results
+    assert results is not None
+    return replace(
+        seen.record,
+        results=results_json(results),
+        is_solved=True,
+        is_applied=True,
+        applied_shift_m=results.rendered_shift_m,
+    )
+
+
+def test_begin_is_grey_on_a_failed_check(snapshot: Maker, record: SessionRecord) -> None:
+    none = replace(record, alignments={})
+    ready = connect_view(snapshot(State.SHOW_HAND, record=none))
+    assert ready.main.is_enabled
+    failed = connect_view(
+        snapshot(State.SHOW_HAND, record=none, contradiction="the camera is not the rig's")
+    )
+    assert not failed.main.is_enabled
+    assert failed.sentence.startswith("A check has failed.")
+    # A result that is there can be looked at, whatever was found against it.
+    found = snapshot(State.APPLIED, contradiction="the camera is not the rig's")
+    assert connect_view(found).main.is_enabled
+
+
+def test_a_confirmation_waits_for_enough_images_and_says_so(snapshot: Maker) -> None:
+    for state, procedure in ((State.ALIGN, {}), (State.VERIFY, {"verifying": NUDGED})):
+        few, enough = (
+            begun().view(
+                snapshot(
+                    state,
+                    procedure=procedure,
+                    camera={"rate_hz": rate_hz},
+                    t_host_ns=2_000_000_000_000,
+                )
+            )
+            for rate_hz in (3.0, 4.0)
+        )
+        assert few.preconditions[0] == Precondition(
+            "Images per second: 3 of the 4 needed. Close other programs.", False
+        )
+        assert not few.main.is_enabled
+        assert enough.main.is_enabled
 
 
 def test_a_resumed_session_says_that_it_continues(snapshot: Maker, record: SessionRecord) -> None:

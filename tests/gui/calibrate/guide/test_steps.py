@@ -12,7 +12,6 @@ from handcal.calibration.plan import PlanSettings, StepName
 from handcal.calibration.states import State
 from handcal.core.types import EYES, Eye, EyeShift, Verdict, VerdictName, Verification
 from handcal.register.verdict import Advice
-from handcal.session.state import WENT_BACK, SessionEvent
 from handcal.station.snapshot import Snapshot
 from handcal_gui.calibrate.guide.steps import Wizard
 from handcal_gui.calibrate.guide.view import Action, ButtonSpec, Step
@@ -24,7 +23,6 @@ from tests.gui.views import (
     judged,
     planned_snapshot,
     tried,
-    with_events,
     with_next,
 )
 
@@ -139,10 +137,10 @@ def test_the_wearer_keeps_the_hand_up(snapshot: Maker) -> None:
     [
         ("accept", True, Action.FINISH, "Finish", "has verified"),
         ("keep", True, Action.FINISH, "Finish", "not used for every eye"),
-        ("accept", False, Action.NEXT, "Finish as it is", "Not every eye has been verified"),
-        ("repeat", True, Action.ANOTHER, "Add alignment", "Not accepted yet. Add an"),
+        ("accept", False, Action.FINISH, "Finish as it is", "Not every eye has been verified"),
+        ("repeat", True, Action.ANOTHER, "Add alignment", "Not good yet. Add an"),
         ("implausible", True, Action.ANOTHER, "Add alignment", "Do not use"),
-        ("contradicted", True, Action.NEXT, "Finish", "Do not use this result. Finish"),
+        ("contradicted", True, Action.FINISH, "Finish", "Do not use this result. Finish"),
     ],
 )
 def test_the_end_says_what_was_reached(
@@ -156,10 +154,11 @@ def test_the_end_says_what_was_reached(
     view = begun().view(done)
     assert says in view.sentence
     assert (view.main.action, view.main.label) == (action, label)
-    other = Action.NEXT if action is Action.ANOTHER else Action.ANOTHER
+    other = Action.FINISH if action is Action.ANOTHER else Action.ANOTHER
     others = [one.action for one in view.others]
     verify = [Action.VERIFY_LEFT, Action.VERIFY_RIGHT] if name != "contradicted" else []
-    assert sorted(others) == sorted([other, *verify])
+    use = [Action.USE_ANYWAY] if name == "keep" else []
+    assert sorted(others) == sorted([other, *verify, *use])
 
 
 def test_a_verification_before_the_last_alignment_is_not_of_the_result(snapshot: Maker) -> None:
@@ -198,11 +197,11 @@ def test_the_end_says_which_eye_to_verify_again(snapshot: Maker) -> None:
     done = replace(done, procedure=replace(done.procedure, results=results))
     view = begun().view(done)
     assert view.sentence == (
-        "Not accepted yet: verify the right eye again. Another alignment would change little."
+        "Not good yet: verify the right eye again. Another alignment would change little."
     )
     assert (view.main.action, view.main.label) == (Action.VERIFY_RIGHT, "Verify the right eye")
     others = [one.action for one in view.others]
-    assert others == [Action.ANOTHER, Action.VERIFY_LEFT, Action.NEXT]
+    assert others == [Action.ANOTHER, Action.VERIFY_LEFT, Action.FINISH]
     worse = replace(results.benefits["right"], after_arcmin=20.0)
     results = replace(
         results,
@@ -223,49 +222,13 @@ def test_one_usable_eye_is_the_only_one_offered(snapshot: Maker) -> None:
         assert Action.VERIFY_LEFT not in actions(begun().view(done))
 
 
-def test_a_drawing_of_another_phi_is_said(snapshot: Maker) -> None:
-    wizard = begun()
-    done = planned_snapshot(snapshot, StepName.DONE)
-    assert done.procedure.results is not None
-    rendered = done.procedure.results.rendered_shift_m
-    as_solved = planned_snapshot(snapshot, StepName.DONE, applied_shift_m=rendered)
-    assert wizard.view(as_solved).fact == ""
-    back = {eye: np.array([0.009, 0.0, 0.0]) for eye in EYES}
-    gone_back = planned_snapshot(snapshot, StepName.DONE, applied_shift_m=back)
-    assert "saved and exported" in wizard.view(gone_back).fact
-    one = planned_snapshot(
-        snapshot, StepName.DONE, applied_shift_m={**rendered, "left": back["left"]}
-    )
-    assert wizard.view(one).fact.startswith("Left eye: drawn, saved and exported with")
-    fine_tuned, went_back = SessionEvent.FINE_TUNED, WENT_BACK
-    zero = {eye: np.zeros(3) for eye in EYES}
-    for names, drawn_m, former_m, which, how in (
-        ([fine_tuned], back, zero, "a fine-tuned φ", "Reset φ in Fine-tune"),
-        ([went_back, fine_tuned], back, rendered, "an earlier φ", "Press G"),
-        ([went_back, fine_tuned], zero, rendered, "the offline calibration's φ", "Press G"),
-        (
-            [went_back, fine_tuned],
-            zero,
-            back,
-            "the offline calibration's φ",
-            "Reset φ in Fine-tune",
-        ),
-        ([went_back, fine_tuned, fine_tuned], back, zero, "a fine-tuned φ", "Reset φ in Fine-tune"),
-    ):
-        data = {"shift_m": {eye: one.tolist() for eye, one in drawn_m.items()}}
-        seen = planned_snapshot(
-            snapshot, StepName.DONE, applied_shift_m=drawn_m, former_shift_m=former_m
-        )
-        record = with_events(seen.record, *((name, data) for name in names))
-        seen = replace(seen, record=record)
-        said = (
-            f"Both eyes: drawn, saved and exported with {which}; the verdict applies to the solved "
-            f"φ. {how} to return."
-        )
-        assert wizard.view(seen).fact == said
-        wizard.move(Action.NEXT)
-        assert wizard.view(seen).fact == said, "at the last step, too"
-        wizard = begun()
+def test_images_are_needed_between_begin_and_the_end(snapshot: Maker) -> None:
+    wizard = Wizard()
+    aligning, done = (planned_snapshot(snapshot, name) for name in (StepName.ALIGN, StepName.DONE))
+    assert not wizard.needs_frames(aligning)
+    wizard.move(Action.NEXT)
+    assert wizard.needs_frames(aligning)
+    assert not wizard.needs_frames(done)
 
 
 def test_every_other_action_is_the_engine_s() -> None:
@@ -365,7 +328,7 @@ def test_a_requested_alignment_can_be_withdrawn_and_a_half_done_plan_ended(
     results = replace(cursor.procedure.results, eyes=left)
     one = replace(cursor, procedure=replace(cursor.procedure, results=results))
     view = begun().view(one)
-    assert view.others[0] == ButtonSpec(Action.NEXT, "Fini&sh with one eye")
+    assert view.others[0] == ButtonSpec(Action.FINISH, "Fini&sh with one eye")
     before = replace(cursor, procedure=replace(cursor.procedure, results=None))
     assert actions(begun().view(before)) == [Action.BACK]
 

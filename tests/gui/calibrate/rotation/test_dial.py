@@ -6,7 +6,7 @@ from PySide6.QtGui import QColor
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.app import theme
-from handcal_gui.calibrate.rotation.dial import RotationDial
+from handcal_gui.calibrate.rotation.panel import RotationDial
 
 LIMIT_RAD = float(np.radians(9.0))
 
@@ -65,7 +65,7 @@ def test_it_is_painted_only_if_it_looks_different(
     dial: RotationDial, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     painted: list[object] = []
-    monkeypatch.setattr("handcal_gui.calibrate.rotation.dial.update_in_turn", painted.append)
+    monkeypatch.setattr("handcal_gui.calibrate.rotation.panel.update_in_turn", painted.append)
     for angle_deg, times in ((3.01, 1), (3.04, 1), (3.06, 2), (8.99, 3), (9.01, 4)):
         dial.show_angle(float(np.radians(angle_deg)), np.radians(9.0), "a word")
         assert len(painted) == times, angle_deg

@@ -13,8 +13,7 @@ from handcal.calibration.states import CalibrationSettings, State
 from handcal.register.guard import GuardSettings, turn_advice
 from handcal.session.journal import Event
 from handcal.station.snapshot import Snapshot
-from handcal_gui.calibrate.rotation.dial import RotationDial
-from handcal_gui.calibrate.rotation.panel import RotationPanel
+from handcal_gui.calibrate.rotation.panel import RotationDial, RotationPanel
 from handcal_gui.widgets.plots import Plot
 from tests.gui.helpers import child
 
@@ -198,36 +197,6 @@ def test_the_limit_is_the_procedures(panel: RotationPanel, snapshot: Make) -> No
     panel.show_snapshot(snapshot(settings=limited(5.0)))
     limit_line, _ = child(panel, Plot).item.listDataItems()
     np.testing.assert_allclose(limit_line.getData()[1], [5.0, 5.0])
-
-
-@pytest.mark.parametrize(
-    ("more_px", "advice", "refused", "has_history"),
-    [
-        (60, TWO_LINES, f"1 confirmation refused. {TURNED}", True),
-        (0, TWO_LINES, "1 confirmation refused.", True),
-        (0, THREE_LINES, "1 confirmation refused.", False),
-    ],
-)
-def test_nothing_overlaps_in_a_low_dock(
-    panel: RotationPanel,
-    snapshot: Make,
-    more_px: int,
-    advice: str,
-    refused: str,
-    has_history: bool,
-) -> None:
-    panel.resize(360, panel.minimumSizeHint().height() + more_px)
-    panel.show()
-    lost = {"hand": None, "rotation_rad": None, "problem": advice}
-    panel.show_snapshot(snapshot(observation=lost, procedure={"refusal": TURNED}))
-    QApplication.processEvents()
-    assert text(panel, "refusals") == refused
-    assert child(panel, QLabel, "rotation-refusals").toolTip().endswith(TURNED)
-    assert child(panel, Plot, "rotation-history").isVisible() == has_history
-    for label in (child(panel, QLabel, f"rotation-{name}") for name in ("advice", "refusals")):
-        assert label.heightForWidth(label.width()) <= label.height()
-    dial = child(panel, RotationDial, "rotation-dial")
-    assert dial.height() >= dial.minimumHeight()
 
 
 def test_the_history_has_no_numbers_before_there_is_a_limit(

@@ -6,7 +6,7 @@ from pytestqt.qtbot import QtBot
 from scipy.spatial.transform import Rotation
 
 from handcal.core.types import Float64
-from handcal_gui.calibrate.rotation.turning_hand import TurningHand
+from handcal_gui.calibrate.rotation.panel import TurningHand
 
 NEAREST = {"x": (0, 0, -1), "y": (0, 0, -1), "z": (0, -1, 0)}
 """Centre of the arrow: on the wearer's side, or at the top."""

@@ -3,7 +3,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
@@ -12,27 +11,27 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QPlainTextEdit,
     QPushButton,
-    QTabWidget,
     QToolButton,
 )
 from pytestqt.qtbot import QtBot
 
 from handcal.calibration.states import State
-from handcal.core.types import EyeDistance, Rig
+from handcal.core.types import EyeDistance
 from handcal.register.results import Results
-from handcal.session.session import Session, SessionRecord
+from handcal.session.session import MAX_NOTES_CHARACTERS, Session, SessionRecord
 from handcal.session.state import SessionEvent
-from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
-from handcal_gui.calibrate.session.panel import SessionPanel
-from handcal_gui.widgets.elided_label import ElidedLabel
+from handcal_gui.calibrate.session.panel import SAVE_MS, SessionPanel
 from handcal_gui.widgets.table import Table
+from tests.gui.calibrate.conftest import Engine
 from tests.gui.helpers import button, child, note_opened, show, text
 
 
 @pytest.fixture
-def panel(qtbot: QtBot) -> SessionPanel:
-    return show(qtbot, SessionPanel(), 430, 450)
+def panel(qtbot: QtBot, engine: Engine) -> SessionPanel:
+    panel = SessionPanel()
+    panel.submit = engine
+    return show(qtbot, panel, 430, 450)
 
 
 def cell(table: Table, row: int, column: int) -> str:
@@ -61,26 +60,6 @@ def test_shows_the_session_of_a_snapshot(
     assert cell(alignments, 0, 3) == "–", "the results are gone"
 
 
-def test_the_numbers_of_a_tab_are_explained_while_there_are_any(
-    panel: SessionPanel, record: SessionRecord
-) -> None:
-    def seen(shown: SessionRecord) -> list[str]:
-        panel.show_record(shown, None)
-        tabs, found = child(panel, QTabWidget), []
-        for tab in range(3):
-            tabs.setCurrentIndex(tab)
-            notes = (one.text() for one in panel.findChildren(ElidedLabel) if one.isVisible())
-            found.append(next((one for one in notes if "φ" in one), ""))
-        return found
-
-    alone = "φ of each alignment alone; the result is in Results"
-    assert seen(replace(record, trials={})) == [alone, "", ""]
-    trial = make_trial(record.rig.eyes["left"], "left", 0.4, np.zeros(3), [1e-3, 0.0, 0.0])
-    error = "Error: between the calibrated φ and the fine-tuned one"
-    assert seen(replace(record, trials={1: trial})) == [alone, error, ""]
-    assert seen(replace(record, alignments={}, trials={})) == ["", "", ""]
-
-
 def test_alignments_that_are_not_written_yet_are_counted(
     panel: SessionPanel, snapshot: Callable[..., Snapshot], record: SessionRecord
 ) -> None:
@@ -106,23 +85,21 @@ def test_an_unchanged_session_is_not_shown_again(
 
 
 def test_deletes_and_takes_back(
-    qtbot: QtBot, panel: SessionPanel, record: SessionRecord, results: Results
+    panel: SessionPanel, record: SessionRecord, results: Results, engine: Engine
 ) -> None:
     panel.show_record(record, results)
     alignments = child(panel, Table, "alignments")
     alignments.selectRow(1)
-    with qtbot.waitSignal(panel.delete_requested) as asked:
-        button(panel, QToolButton, "Delete").click()
-    assert asked.args == ["alignment", 2]
+    button(panel, QToolButton, "Delete").click()
+    engine.station.delete.assert_called_once_with("alignment", 2)
     with Session(record.path) as session:
         session.delete("alignment", 2)
     panel.show_record(Session.open(record.path), None)
     assert alignments.model().rowCount() == 1
     assert text(panel, "undoText") == "Alignment 2 deleted."
     alignments.setFocus()
-    with qtbot.waitSignal(panel.restore_requested) as asked:
-        QTest.keyClick(alignments, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
-    assert asked.args == ["alignment", 2]
+    QTest.keyClick(alignments, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    engine.station.restore.assert_called_once_with("alignment", 2)
     with Session(record.path) as session:
         session.restore("alignment", 2)
     panel.show_record(Session.open(record.path), None)
@@ -131,40 +108,43 @@ def test_deletes_and_takes_back(
     assert not button(panel, QToolButton, "Undo").isVisible()
 
 
-def test_deletes_trials_and_takes_back(
-    qtbot: QtBot, panel: SessionPanel, record: SessionRecord, rig: Rig
-) -> None:
-    with Session(record.path) as session:
-        trial = make_trial(rig.eyes["left"], "left", 0.4, np.zeros(3), [0.001, 0.0, 0.0])
-        for _ in range(2):
-            session.save_trial(trial)
-        session.delete("trial", 2)
-    panel.show_record(Session.open(record.path), None)
-    [tabs] = panel.findChildren(QTabWidget)
-    tabs.setCurrentIndex(1)
-    child(panel, Table, "trials-of-the-session").selectRow(0)
-    with qtbot.waitSignal(panel.delete_requested) as asked:
-        button(panel, QToolButton, "Delete").click()
-    assert asked.args == ["trial", 1]
-    with qtbot.waitSignal(panel.restore_requested) as asked:
-        button(panel, QToolButton, "Undo").click()
-    assert asked.args == ["trial", 2]
-    tabs.setCurrentIndex(2)
-    assert not button(panel, QToolButton, "Delete").isVisible()
-
-
-def test_notes_are_passed_on(qtbot: QtBot, panel: SessionPanel, record: SessionRecord) -> None:
-    panel.show_record(record, None)
-    [edit] = panel.findChildren(QPlainTextEdit)
-    edit.setPlainText("left-handed")
-    with qtbot.waitSignal(panel.notes_changed) as asked:
-        panel.flush()
-    assert asked.args == ["left-handed"]
-
-
-def test_a_finished_session_is_only_looked_at(
+def test_notes_are_saved_a_moment_after_the_last_key_and_at_the_end(
     qtbot: QtBot, panel: SessionPanel, record: SessionRecord
 ) -> None:
+    saved: list[str] = []
+    panel.notes.save = saved.append
+    edit = child(panel, QPlainTextEdit)
+    assert not edit.isEnabled()
+    panel.show_record(record, None)
+    edit.setPlainText("left")
+    edit.setPlainText("left-handed")
+    assert text(panel, "notesState") == "Not saved yet"
+    assert saved == []
+    qtbot.waitUntil(lambda: saved == ["left-handed"], timeout=5 * SAVE_MS)
+    panel.show_record(replace(record, notes="left-handed"), None)
+    assert (panel.notes.are_saved, text(panel, "notesState")) == (True, "✓ Saved")
+    edit.setPlainText("glasses")
+    panel.notes.flush()
+    assert saved[-1] == "glasses"
+    panel.show_record(replace(record, notes="other"), None)
+    assert edit.toPlainText() == "glasses", "what is being written is not replaced"
+
+
+def test_notes_that_are_too_long_are_not_saved_and_say_so(
+    panel: SessionPanel, record: SessionRecord
+) -> None:
+    saved: list[str] = []
+    panel.notes.save = saved.append
+    panel.show_record(record, None)
+    child(panel, QPlainTextEdit).setPlainText("x" * (MAX_NOTES_CHARACTERS + 1))
+    panel.notes.flush()
+    assert saved == []
+    assert "Too long by 1" in text(panel, "notesState")
+    panel.set_read_only(True)
+    assert child(panel, QPlainTextEdit).isReadOnly()
+
+
+def test_a_finished_session_is_only_looked_at(panel: SessionPanel, record: SessionRecord) -> None:
     with Session(record.path) as session:
         session.delete("alignment", 2)
         session.finish()
@@ -174,10 +154,8 @@ def test_a_finished_session_is_only_looked_at(
     child(panel, Table, "alignments").selectRow(0)
     assert not button(panel, QToolButton, "Delete").isEnabled()
     assert text(panel, "undoText") == ""
-    with qtbot.waitSignal(panel.export_requested):
-        button(panel, QPushButton, "Export…").click()
-    with qtbot.waitSignal(panel.inspect_requested):
-        button(panel, QPushButton, "Inspect in 3D").click()
+    assert panel.export_button.isEnabled()
+    assert panel.inspect_button.isEnabled()
 
 
 def test_opens_the_folder(
@@ -190,7 +168,7 @@ def test_opens_the_folder(
 
 
 def test_an_eye_distance_is_taken_in_millimetres_or_refused(
-    qtbot: QtBot, panel: SessionPanel, record: SessionRecord, results: Results
+    panel: SessionPanel, record: SessionRecord, results: Results, engine: Engine
 ) -> None:
     field, problem = (
         child(panel, QLineEdit, "eyeDistance"),
@@ -198,8 +176,10 @@ def test_an_eye_distance_is_taken_in_millimetres_or_refused(
     )
     assert not field.isEnabled()
     panel.show_record(record, results)
-    asked: list[EyeDistance | None] = []
-    panel.eye_distance_changed.connect(asked.append)
+    taken = engine.station.calibration.set_eye_distance
+
+    def asked() -> list[EyeDistance | None]:
+        return [call.args[0] for call in taken.mock_calls]
 
     def enter(text: str) -> None:
         field.selectAll()
@@ -214,19 +194,19 @@ def test_an_eye_distance_is_taken_in_millimetres_or_refused(
         panel.show_record(record, results)
         assert field.text() == wrong, "what is being corrected is not replaced"
     enter("63,5")
-    assert asked == [EyeDistance(0.0635)]
+    assert asked() == [EyeDistance(0.0635)]
     assert not problem.isVisible()
     assert field.text() == "", "not stored yet"
     for stored, shown, placeholder in (
-        (asked[0], "63.5", "Not measured"),
+        (asked()[0], "63.5", "Not measured"),
         (EyeDistance(0.066, source="headset"), "", "66.0 ± 1.0 mm (headset)"),
     ):
         facts = replace(record.facts, eye_distance=stored)
         panel.show_record(replace(record, facts=facts), results)
         assert (field.text(), field.placeholderText()) == (shown, placeholder)
     enter(" ")
-    assert asked[1:] == [None]
+    assert asked()[1:] == [None]
     QTest.keyClick(field, Qt.Key.Key_Return)
-    assert len(asked) == 2, "unchanged"
+    assert len(asked()) == 2, "unchanged"
     panel.set_read_only(True)
     assert not field.isEnabled()

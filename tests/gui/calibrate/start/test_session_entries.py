@@ -36,7 +36,7 @@ def test_unfinished_sessions_are_told_by_wearer_time_and_alignments(
     (entry,) = find_sessions(tmp_path, ()).unfinished
     assert entry.path == path
     assert entry.is_enabled
-    assert entry.text.startswith(f"Ada · {datetime.now().astimezone():%d %b %Y}")
+    assert entry.text.startswith(f"Ada · {datetime.now().astimezone():%Y-%m-%d}")
     assert entry.text.endswith(" · 1 alignment")
 
 

@@ -10,7 +10,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.session.library import EyeOutcome
 from handcal_gui.calibrate.start.session_entries import Entry
-from handcal_gui.calibrate.start.session_list import SessionList
+from handcal_gui.calibrate.start.start_page import SessionList
 from tests.gui.helpers import child, show
 
 

@@ -12,24 +12,17 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
-    QDoubleSpinBox,
     QFileDialog,
     QLabel,
     QListWidget,
-    QScrollArea,
-    QToolButton,
     QWidget,
 )
 from pytestqt.qtbot import QtBot
 
 from handcal.camera.settings import RealSenseSettings
-from handcal.core.types import Eye
-from handcal.session.library import EyeOutcome
 from handcal.station.checks.doctor import Health
 from handcal.station.checks.preflight import Part
 from handcal_gui.app.preferences import Preferences
-from handcal_gui.app.theme import SPACING_PX, icon
-from handcal_gui.calibrate.start.card import Card
 from handcal_gui.calibrate.start.session_entries import Entry, KnownSessions
 from handcal_gui.calibrate.start.start_page import StartPage
 from tests.gui.calibrate.start.conftest import (
@@ -41,7 +34,6 @@ from tests.gui.calibrate.start.conftest import (
     text,
     wearer,
 )
-from tests.gui.helpers import letters
 
 
 def test_a_headset_that_is_awaited_can_be_connected(
@@ -50,8 +42,13 @@ def test_a_headset_that_is_awaited_can_be_connected(
     inspector.healths["headset"] = Health.LIMITED
     page = open_page(source="realsense", headset="network")
     qtbot.waitUntil(lambda: button(page, "headsetFix").text() == "Co&nnect…")
-    with qtbot.waitSignal(page.connect_wanted):
-        button(page, "headsetFix").click()
+    asked: list[bool] = []
+    page.new.form.connect_headset = lambda: asked.append(True)
+    page.new.check()
+    qtbot.waitUntil(lambda: len(inspector.asked) > 1)
+    qtbot.wait(100)
+    button(page, "headsetFix").click()
+    assert asked == [True]
 
 
 def test_typing_a_name_and_enter_starts(
@@ -60,7 +57,7 @@ def test_typing_a_name_and_enter_starts(
     page = open_page()
     assert wearer(page).hasFocus() or page.focusWidget() is wearer(page).lineEdit()
     QTest.keyClicks(wearer(page), " Ada ")
-    with qtbot.waitSignal(page.start_requested) as started:
+    with qtbot.waitSignal(page.new.start_requested) as started:
         QTest.keyClick(wearer(page), Qt.Key.Key_Return)
     settings, name = started.args
     assert name == "Ada"
@@ -81,7 +78,7 @@ def test_a_former_name_is_offered_in_a_list_and_never_typed_in_by_itself(
     qtbot.waitUntil(lambda: QApplication.activePopupWidget() is not None)
     offered = QApplication.activePopupWidget()
     assert offered is not None
-    with qtbot.waitSignal(page.start_requested) as started:
+    with qtbot.waitSignal(page.new.start_requested) as started:
         QTest.keyClick(offered, Qt.Key.Key_Return)
     assert started.args[1] == "An"
 
@@ -93,7 +90,7 @@ def test_keys_of_the_former_page_are_no_name_and_start_nothing(
     for _ in range(2):
         QTest.keyClick(wearer(page), Qt.Key.Key_Space)
     assert wearer(page).currentText() == ""
-    with qtbot.assertNotEmitted(page.start_requested, wait=100):
+    with qtbot.assertNotEmitted(page.new.start_requested, wait=100):
         QTest.keyClick(wearer(page), Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
     QTest.keyClicks(wearer(page), "Ada B")
     assert wearer(page).currentText() == "Ada B"
@@ -108,7 +105,7 @@ def test_what_is_wrong_with_a_name_is_said_beside_it(
     wearer(page).setEditText("A\x07B")
     assert problem.isVisible()
     assert "must not contain line breaks or control characters." in problem.text()
-    with qtbot.assertNotEmitted(page.start_requested, wait=100):
+    with qtbot.assertNotEmitted(page.new.start_requested, wait=100):
         QTest.keyClick(wearer(page), Qt.Key.Key_Return)
     wearer(page).setEditText("AB")
     assert not problem.isVisible()
@@ -129,25 +126,6 @@ def test_the_key_that_starts_is_shown_where_it_does(
     assert key.text() == "Return"
 
 
-def test_the_key_that_starts_is_hidden_while_it_cannot_and_an_error_moves_nothing(
-    qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage]
-) -> None:
-    page = open_page()
-    page.activateWindow()
-    wearer(page).setFocus()
-    key = find(page, QLabel, "startKey")
-    qtbot.waitUntil(key.isVisible)
-    folder = find(page, QWidget, "sessionsFinding")
-    y_px = folder.y()
-    inspector.healths["camera"] = inspector.healths["headset"] = Health.BROKEN
-    choose(page, "source", "realsense")
-    qtbot.waitUntil(lambda: button(page, "cameraFix").isVisible())
-    assert button(page, "headsetFix").isVisible()
-    assert not key.isVisible()
-    QApplication.processEvents()  # lays out
-    assert folder.y() == y_px
-
-
 def test_fields_are_reached_by_letters(qtbot: QtBot, open_page: Callable[..., StartPage]) -> None:
     page = open_page()
     page.activateWindow()
@@ -166,54 +144,6 @@ def test_fields_are_reached_by_letters(qtbot: QtBot, open_page: Callable[..., St
         "Rig file",
         "Session folder",
     }
-
-
-def test_the_letter_of_advanced_leads_to_its_first_field(
-    qtbot: QtBot, open_page: Callable[..., StartPage]
-) -> None:
-    page = open_page()
-    page.resize(960, 520)
-    page.activateWindow()
-    qtbot.waitActive(page)
-    QTest.keyClick(page.windowHandle(), Qt.Key.Key_A, Qt.KeyboardModifier.AltModifier)
-    guard = find(page, QDoubleSpinBox, "guard")
-    qtbot.waitUntil(guard.hasFocus)
-    assert guard.visibleRegion().boundingRect() == guard.rect()
-    wearer(page).setFocus()
-    fold = find(page, QToolButton, "advanced")
-    fold.setAttribute(Qt.WidgetAttribute.WA_UnderMouse)
-    for is_open in (False, True):
-        fold.click()
-        assert fold.isChecked() is is_open
-    QApplication.processEvents()
-    assert wearer(page).hasFocus()
-
-
-def test_each_letter_leads_to_one_place(
-    qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage]
-) -> None:
-    inspector.healths["headset"] = Health.LIMITED
-    page = open_page(source="realsense", headset="network")
-    qtbot.waitUntil(lambda: button(page, "headsetFix").text() != "")
-    found = [*"fevh", *letters(page)]  # of the window's menus, and of hidden buttons, too
-    assert len(set(found)) == len(found) >= 22
-
-
-@pytest.mark.parametrize("camera", [Health.GOOD, Health.BROKEN])
-def test_the_letter_of_a_fix_leads_to_one_place(
-    qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage], camera: Health
-) -> None:
-    inspector.healths["camera"], inspector.healths["rig"] = camera, Health.BROKEN
-    page = open_page(source="realsense", rig="/nowhere.yaml")
-    qtbot.waitUntil(lambda: button(page, "rigFix").isVisible())
-    found = letters(page, is_shown=True)
-    assert len(set(found)) == len(found)
-    is_first = camera is Health.GOOD
-    assert [button(page, name).text() for name in ("rigFix", "headsetFix")] == [
-        "Use the exa&mple" if is_first else "Use the example",
-        "Use a networ&k headset",
-    ]
-    assert "m" in found
 
 
 def test_the_next_wearer_finds_everything_as_it_was(open_page: Callable[..., StartPage]) -> None:
@@ -259,7 +189,7 @@ def test_a_page_that_checks_says_so_beside_the_grey_button(
     qtbot.waitUntil(button(page, "start").isEnabled)
     page.new.check()
     assert text(page, "startProblem") == "", "it can be started meanwhile"
-    with qtbot.waitSignal(page.start_requested):
+    with qtbot.waitSignal(page.new.start_requested):
         button(page, "start").click()
         assert text(page, "startProblem") == "Checking camera, headset and files…"
     assert text(page, "startProblem") == ""
@@ -270,11 +200,11 @@ def test_what_breaks_after_the_last_look_is_found_by_the_start(
 ) -> None:
     page = open_page()
     inspector.healths["sessions"] = Health.BROKEN
-    with qtbot.assertNotEmitted(page.start_requested):
+    with qtbot.assertNotEmitted(page.new.start_requested):
         button(page, "start").click()
         qtbot.waitUntil(lambda: "Session folder" in text(page, "startProblem"))
     inspector.healths["sessions"] = Health.GOOD
-    with qtbot.assertNotEmitted(page.start_requested, wait=50):
+    with qtbot.assertNotEmitted(page.new.start_requested, wait=50):
         page.new.check()
         qtbot.waitUntil(button(page, "start").isEnabled)
 
@@ -322,31 +252,15 @@ def test_unfinished_and_recent_sessions_are_offered(
     qtbot.waitUntil(resume.isVisible)
     unfinished = find(resume, QListWidget)
     assert [unfinished.item(i).text() for i in range(2)] == ["damaged", "Ada"]
-    with qtbot.waitSignal(page.resume_requested) as resumed:
+    with qtbot.waitSignal(page.unfinished.chosen) as resumed:
         button(resume, "choose").click()
     assert resumed.args == [tmp_path / "a"]
     unfinished.setCurrentRow(0)
-    with qtbot.assertNotEmitted(page.resume_requested):
+    with qtbot.assertNotEmitted(page.unfinished.chosen):
         unfinished.itemActivated.emit(unfinished.item(0))
-    with qtbot.waitSignal(page.open_requested) as chosen:
+    with qtbot.waitSignal(page.recent.chosen) as chosen:
         QTest.keyClick(find(opened, QListWidget), Qt.Key.Key_Return)
     assert chosen.args == [tmp_path / "b"]
-
-
-def test_nothing_scrolls_at_1920x1080_with_200_percent(
-    qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage], tmp_path: Path
-) -> None:
-    eyes: dict[Eye, EyeOutcome] = {"left": EyeOutcome("accept", 20, 5, None)}
-    entries = tuple(Entry(tmp_path / name, name, eyes=eyes) for name in "abcd")
-    inspector.offers = KnownSessions(entries, entries)
-    page = open_page()
-    qtbot.waitUntil(find(page, QWidget, "resume").isVisible)
-    page.resize(960, 488)  # less the title bar and the menus
-    areas = [one for one in page.findChildren(QScrollArea) if one.isVisible()]
-    assert len(areas) == 2
-    qtbot.waitUntil(lambda: all(one.verticalScrollBar().maximum() == 0 for one in areas))
-    for legend in page.findChildren(QLabel, "legend"):
-        assert legend.fontMetrics().horizontalAdvance(legend.text()) <= legend.width()
 
 
 def test_any_session_folder_can_be_opened(
@@ -355,10 +269,10 @@ def test_any_session_folder_can_be_opened(
     page = open_page()
     answers = iter(["/some/session", ""])
     monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: next(answers))
-    with qtbot.waitSignal(page.open_requested) as opened:
+    with qtbot.waitSignal(page.recent.chosen) as opened:
         button(page, "browse").click()
     assert opened.args == [Path("/some/session")]
-    with qtbot.assertNotEmitted(page.open_requested):
+    with qtbot.assertNotEmitted(page.recent.chosen):
         page.browse()
 
 
@@ -384,7 +298,7 @@ def test_a_check_that_breaks_down_is_reported_and_starts_nothing(
     button(page, "start").click()
     qtbot.waitUntil(lambda: "unexpected error" in text(page, "startProblem"))
     monkeypatch.undo()
-    with qtbot.assertNotEmitted(page.start_requested, wait=50):
+    with qtbot.assertNotEmitted(page.new.start_requested, wait=50):
         page.new.check()
         qtbot.waitUntil(button(page, "start").isEnabled)
 
@@ -406,9 +320,3 @@ def test_a_realsense_is_looked_for_less_often_and_least_by_an_inactive_window(
     assert not inspector.progress.is_cancelled()
     page.stop()
     assert inspector.progress.is_cancelled()  # a process that hangs is not waited for
-
-
-def test_no_card_has_the_sign_of_what_is_done(open_page: Callable[..., StartPage]) -> None:
-    done = icon("check").pixmap(3 * SPACING_PX).toImage()
-    for card in open_page().findChildren(Card):
-        assert all(label.pixmap().toImage() != done for label in card.findChildren(QLabel))

@@ -22,8 +22,7 @@ from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
 from handcal_gui.calibrate.fine_tune.panel import FineTunePanel
 from handcal_gui.calibrate.trials.comparison_row import ComparisonRow
-from handcal_gui.calibrate.trials.panel import TrialsPanel
-from handcal_gui.calibrate.trials.trial_plot import TrialPlot
+from handcal_gui.calibrate.trials.panel import TrialPlot, TrialsPanel
 from handcal_gui.widgets.table import Table
 from tests.gui.calibrate.conftest import Engine
 from tests.gui.helpers import button, child, text

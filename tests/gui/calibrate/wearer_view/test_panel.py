@@ -3,8 +3,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint
-from PySide6.QtWidgets import QApplication, QCheckBox, QLabel
+from PySide6.QtWidgets import QCheckBox, QLabel
 from pytestqt.qtbot import QtBot
 
 from handcal.calibration.states import State
@@ -170,31 +169,3 @@ def test_both_eyes_are_shown_in_one_scale(panel: WearerViewPanel, snapshot: Make
     panel.show_snapshot(replace(now, views={**now.views, "right": cut}))
     left_px, right_px = (_canvas(panel, eye).crop_px.size() for eye in EYES)
     assert left_px == right_px
-
-
-@pytest.mark.parametrize(
-    ("size_px", "is_below"), [((384, 310), False), ((360, 900), True), ((900, 500), False)]
-)
-def test_the_eyes_stand_where_they_are_largest(
-    panel: WearerViewPanel, snapshot: MakeSnapshot, size_px: tuple[int, int], is_below: bool
-) -> None:
-    panel.resize(360, 900)
-    panel.show_snapshot(snapshot())
-    for _ in range(3):  # a layout may ask for another
-        panel.resize(*size_px)
-        QApplication.processEvents()
-    assert panel.size().toTuple() == size_px
-    left, right = (_canvas(panel, eye).mapTo(panel, QPoint(0, 0)) for eye in EYES)
-    assert (right.y() > left.y()) == is_below
-    assert (right.x() > left.x()) != is_below
-
-
-def test_eyes_below_one_another_need_no_more_height_than_side_by_side(
-    panel: WearerViewPanel,
-) -> None:
-    """Behind a tab it is not resized, and held the tabs up in a window made lower."""
-    least_px = panel.minimumSizeHint().height()
-    panel.resize(360, 900)
-    QApplication.processEvents()
-    assert _canvas(panel, "right").mapTo(panel, QPoint()).y() > 300
-    assert panel.minimumSizeHint().height() == least_px

@@ -31,7 +31,9 @@ from handcal_gui.app.keys import keys_by_group
 from handcal_gui.app.program import Program
 from handcal_gui.calibrate.guide.action_bar import ActionBar
 from handcal_gui.calibrate.guide.view import Action, ButtonSpec, Step, WizardView
+from handcal_gui.calibrate.sections import TITLES
 from handcal_gui.calibrate.window import MainWindow
+from handcal_gui.engine.engine_thread import Command
 from handcal_gui.widgets.table import Table
 from tests.gui.calibrate.window.conftest import Maker, main_button, offer_solve, press, say
 from tests.gui.views import begun
@@ -103,27 +105,12 @@ def test_no_key_is_taken_twice(window: MainWindow) -> None:
         assert len(keys) == len(set(keys))
 
 
-def test_the_space_bar_is_the_wizards_in_a_dock_of_its_own_too(
-    qtbot: QtBot, window: MainWindow
-) -> None:
-    window.show_page("live")
-    dock = window.docks["link"]
-    dock.setFloating(True)
-    offer_solve(window)
-    with qtbot.waitSignal(main_button(window).clicked, timeout=1000):
-        QTest.keyClick(dock.widget(), Qt.Key.Key_Space)
-    window.banner.show_message("Could not solve")
-    QTest.keyClick(dock.widget(), Qt.Key.Key_Escape)
-    assert window.banner.text == ""
-
-
 def focusable(window: MainWindow) -> Iterator[QWidget]:
     """Give every widget of the calibration page that can have the keyboard, tab after tab."""
     seen: set[QWidget] = set()
-    for dock in window.docks.values():
-        dock.show()
-        dock.raise_()
-        tabs = dock.findChildren(QTabWidget)
+    for name in TITLES:
+        window.go_to(name)
+        tabs = getattr(window.panels, name).findChildren(QTabWidget)
         for i in range(max([1, *(tab.count() for tab in tabs)])):
             for tab in tabs:
                 tab.setCurrentIndex(i)
@@ -178,8 +165,13 @@ def test_space_presses_only_the_main_button_from_every_focus(
     window = program.window
     asked = show_buttons(program, snapshot(State.APPLIED), is_enabled=is_enabled)
     qtbot.waitActive(window)
-    wrong: list[object] = []
-    window.panels.session.delete_requested.connect(wrong.append)
+    wrong: list[str] = []
+
+    def submit(name: str, _command: Command) -> int:
+        wrong.extend([name] * name.startswith("delete"))
+        return 0
+
+    window.panels.session.submit = submit
     clicked = watch_clicks(window)
     expected = [Action.TAKE_STEP] if is_enabled else []
     texts, kinds = 0, set()
@@ -236,10 +228,10 @@ def test_tab_leads_to_nothing_that_discards_or_deletes(
     show_buttons(program, snapshot(State.APPLIED), is_enabled=True)
     qtbot.waitActive(window)
     reached: set[str] = set()
-    for name, dock in window.docks.items():
-        dock.raise_()
+    for name in TITLES:
+        window.go_to(name)
         if name == "session":
-            dock.findChildren(Table)[0].setFocus()
+            window.panels.session.findChildren(Table)[0].setFocus()
         for _ in range(60):
             press(window, Qt.Key.Key_Tab)
             focused = window.focusWidget()

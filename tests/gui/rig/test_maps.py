@@ -3,7 +3,7 @@ from PySide6.QtGui import QColor
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.boards.views import Coverage
-from handcal_gui.rig.coverage_map import CoverageMap
+from handcal_gui.rig.maps import CoverageMap
 
 
 def test_the_fuller_a_cell_the_darker(qtbot: QtBot) -> None:

@@ -1,14 +1,16 @@
-"""A map of the image areas in which the board was seen."""
+"""Maps of a camera's image: where the board was seen, and how uncertain the projection is."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
 
+import numpy as np
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from handcal.rig.boards.views import Coverage
+from handcal.rig.lens.uncertainty import GRID, ProjectionUncertainty
 from handcal_gui.app.theme import SPACING_PX, colors
 from handcal_gui.app.translation import tr
 
@@ -118,3 +120,46 @@ class CoverageMap(CellMap):
             shade(painter, cell, 0.7 * min(1.0, hits / _PLENTY))
             painter.setPen(self.palette().windowText().color())
             painter.drawText(cell, Qt.AlignmentFlag.AlignCenter, str(hits))
+
+
+_LARGE_PX = 1.0
+"""Uncertainty from which on a cell has its full colour."""
+
+
+class UncertaintyMap(CellMap):
+    """Shows by colour how uncertain the direction of a pixel is in each part of the image."""
+
+    def __init__(self, title: str) -> None:
+        super().__init__(title, GRID)
+        self.setObjectName("uncertainty")
+        self.setAccessibleName(tr("Uncertainty, {}").format(title.lower()))
+        self.setToolTip(
+            tr(
+                "Standard deviation of the pixel at which a distant point appears; dark from 1 px "
+                "on. Take images with the board in the dark parts. Crossed: not known."
+            )
+        )
+        self._uncertainty: ProjectionUncertainty | None = None
+
+    def show_uncertainty(self, uncertainty: ProjectionUncertainty | None) -> None:
+        """Show the uncertainty; None if the camera was not solved."""
+        self._uncertainty = uncertainty
+        self.refresh()
+
+    @property
+    def caption(self) -> str:
+        """The text above the cells."""
+        if self._uncertainty is None:
+            return f"{self._title}: –"
+        found = self._uncertainty
+        return f"{self._title}: ± {found.middle_px:.2f}, {found.edge_px:.2f} px"
+
+    def paint_cell(self, painter: QPainter, cell: QRectF, row: int, column: int) -> None:
+        """Draw the uncertainty there."""
+        if self._uncertainty is None:
+            return
+        sigma_px = float(self._uncertainty.sigma_px[row, column])
+        if np.isfinite(sigma_px):
+            shade(painter, cell, 0.9 * min(1.0, sigma_px / _LARGE_PX))
+        else:
+            painter.drawLine(cell.topLeft(), cell.bottomRight())

@@ -7,13 +7,14 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from handcal.calibration.states import CalibrationSettings
 from handcal.session.session import Session
 from handcal.station.settings import StationSettings
-from handcal_gui.app.autopilot import autopilot, demonstration, tour
-from handcal_gui.app.autopilot.demonstration import Demonstration
+from handcal_gui.app import autopilot
+from handcal_gui.app.autopilot import Demonstration
 from handcal_gui.app.preferences import PREFERENCES_VERSION, PreferencesFile
 from handcal_gui.app.program import Program
 from tests.helpers import Patience, slow_simulator, write_small_rig
@@ -29,10 +30,14 @@ def test_a_demonstration_calibrates_exports_and_takes_pictures(
     qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     codes: list[int] = []
-    application = SimpleNamespace(quit=lambda: codes.append(0), exit=codes.append)
-    monkeypatch.setattr(demonstration, "QApplication", application)
+    kept = {
+        name: getattr(QApplication, name)
+        for name in ("sendPostedEvents", "activeModalWidget", "sendEvent")
+    }
+    application = SimpleNamespace(quit=lambda: codes.append(0), exit=codes.append, **kept)
+    monkeypatch.setattr(autopilot, "QApplication", application)
     monkeypatch.setattr(autopilot, "_LOOK_S", 0.05)
-    monkeypatch.setattr(tour, "_LOOK_MS", 60)
+    monkeypatch.setattr(autopilot, "_LOOK_MS", 60)
     slow_simulator(monkeypatch)
     preferences = tmp_path / "preferences.json"
     export = {"formats": ["report", "csv"]}

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from handcal.core.errors import FileError
-from handcal_gui.app.autopilot.screenshots import Screenshots
+from handcal_gui.app.autopilot import Screenshots
 from handcal_gui.calibrate.guide.view import Action, ButtonSpec, Step, WizardView
 
 

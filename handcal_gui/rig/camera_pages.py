@@ -1,8 +1,7 @@
-"""The second step: the pose of the depth camera on the headset."""
+"""The second and third step: the depth camera's pose, and the viewpoint camera's intrinsics."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 
 from PySide6.QtWidgets import QWidget
@@ -10,16 +9,18 @@ from PySide6.QtWidgets import QWidget
 from handcal.camera.take_board import DEPTH_TO_COLOR, IMAGER
 from handcal.rig.boards.views import ASKED_VIEWS
 from handcal.rig.formats import read_intrinsics, read_pose
+from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.app.translation import tr
 from handcal_gui.rig.images_panel import ImagesPanel
 from handcal_gui.rig.lens_fields import intrinsics_field, lens_field
-from handcal_gui.rig.project import RigProject
-from handcal_gui.rig.solve import SolvedPart, solve_stereo
+from handcal_gui.rig.project import UNREADABLE, RigProject
+from handcal_gui.rig.solve import SolvedPart, solve_stereo, solve_viewpoint
+from handcal_gui.rig.solve_box import HEALTHS
 from handcal_gui.rig.step_page import StepPage, images_needed
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
 
-_HINT = tr(
+_STEREO_HINT = tr(
     "Take {} or more pairs of simultaneous images of the board: near and far, in all parts of both "
     "views, tilted by 20° to 45° in all directions. Give the two images of a pair the same name, "
     "or let them end in the same number, as depth07.png and headset07.png do."
@@ -74,30 +75,21 @@ class StereoPage(StepPage):
                 "depth_to_color": (tr("Pose &from depth to colour"), pose),
             }
         )
-        form.show_entries(project.inputs.stereo)
         panel = ImagesPanel(
-            project, (tr("Depth camera"), tr("Headset camera")), _HINT, "setup-stereo"
+            project,
+            (tr("Depth camera"), tr("Headset camera")),
+            _STEREO_HINT,
+            "setup-stereo",
+            ("depth_images", "headset_images"),
         )
         super().__init__("stereoPage", "T_H_D", project, form, {tr("&Pairs"): panel}, parent)
         self.panel = panel
         self.panel.take.clicked.connect(self._take)
         self.show_known()
 
-    def enter(self) -> None:
-        """Search the folders for the board, unless already done."""
-        entries = self.project.inputs.stereo
-        folders = entries.depth_images, entries.headset_images
-        self.panel.look(folders, self.project.inputs.board, entries.dropped)
-
-    def keep(self) -> None:
-        """Store the entries, and search new folders for the board."""
-        entries = self.form.take(self.project.inputs.stereo)
-        self.project.enter(stereo=replace(entries, dropped=self.panel.dropped_of(entries.dropped)))
-        self.enter()
-
     def solve(self) -> None:
         """Solve from the pairs that are not excluded."""
-        work = partial(solve_stereo, self.panel.shots, self.project.inputs.stereo)
+        work = partial(solve_stereo, self.panel.shots, self.entries)
         self.box.run(work, self._show_solved)
 
     @property
@@ -123,3 +115,85 @@ class StereoPage(StepPage):
             self.form.enter(**{name: str(file) for name, file in told.items() if file.exists()})
 
         self.take_images(folders, self.project.inputs.board, self.panel, then)
+
+
+_VIEWPOINT_HINT = tr(
+    "Take {} or more images of the board with the viewpoint camera, with the focus that it will "
+    "have behind the display: in all parts of the view up to its edges, tilted by 20° to 45° in "
+    "all directions."
+).format(ASKED_VIEWS)
+
+
+class ViewpointPage(StepPage):
+    """Images of the board and the intrinsics solved from them, or a file of intrinsics."""
+
+    def __init__(self, project: RigProject, parent: QWidget | None = None) -> None:
+        given = PathField(
+            tr("Intrinsics"),
+            "file",
+            INTRINSICS_FILES,
+            tr("Solved from the images"),
+            read=read_intrinsics,
+        )
+        form = EntriesForm(
+            {
+                "images": (
+                    tr("&Viewpoint camera's images"),
+                    PathField(tr("Viewpoint images"), "folder"),
+                ),
+                "lens": (tr("L&ens"), lens_field()),
+                "intrinsics": (tr("Its in&trinsics"), given),
+            }
+        )
+        panel = ImagesPanel(
+            project, (tr("Viewpoint camera"),), _VIEWPOINT_HINT, "setup-viewpoint", ("images",)
+        )
+        super().__init__(
+            "viewpointPage", "viewpoint", project, form, {tr("I&mages"): panel}, parent
+        )
+        self.panel = panel
+        self.panel.take.clicked.connect(self._take)
+        self.show_known()
+
+    def solve(self) -> None:
+        """Solve from the images that are not excluded."""
+        entries, output = self.entries, self.project.folder.viewpoint
+        self.box.run(partial(solve_viewpoint, self.panel.shots, entries, output), self._show_solved)
+
+    def show_known(self) -> None:
+        """Show the file of intrinsics, if there is one."""
+        outdated = self.project.outdated("viewpoint")
+        self.box.show_origin(None, outdated)
+        file = self.project.camera_file
+        if not outdated and (verdict := self.project.camera_verdict):
+            found = tr("the intrinsics are in {}: {}").format(file, verdict)
+            finding = Finding("", HEALTHS.get(verdict, Health.LIMITED), found)
+            if verdict == UNREADABLE:
+                advice = tr("choose another file, or solve them")
+                finding = Finding("", Health.BROKEN, found, advice)
+            self.box.show_finding(finding)
+
+    @property
+    def need(self) -> str:
+        """Images, if there are none."""
+        request = tr("to solve, take images of the board, or choose their folder in Inputs")
+        return images_needed(self.panel, request)
+
+    def _show_solved(self, solved: SolvedPart) -> None:
+        is_bad = solved.verdict.name == "bad"
+        kept = tr("it is not used") if is_bad else tr("the displays will be calibrated with it")
+        if not is_bad:
+            self.project.note_solved("viewpoint", self.solved_with)
+        self.project.camera_solved()
+        self.box.show_solved(solved, kept)
+        self.panel.show_solved(solved)
+        self.show_if_changed()
+
+    def _take(self) -> None:
+        folder = self.project.folder.path / "viewpoint"
+        self.take_images(
+            {tr("Viewpoint camera"): folder},
+            self.project.inputs.board,
+            self.panel,
+            lambda: self.form.enter(images=str(folder)),
+        )
