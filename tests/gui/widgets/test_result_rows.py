@@ -176,7 +176,7 @@ def test_trials_over_the_target_are_marked(
     assert f"{mean:.1f}′" in left[1]
     assert right == ("✓ Good", "As told")
     repeated = replace(results, verdicts=dict.fromkeys(EYES, Verdict("repeat", "as told")))
-    assert verdict_rows(repeated, over)[0].cells == ("↻ Repeat", "As told")
+    assert verdict_rows(repeated, over)[0].cells == ("↻ Not yet", "As told")
     assert [verdict_color(name, over["left"]) for name in ("accept", "keep", "implausible")] == [
         "warning",
         "warning",
