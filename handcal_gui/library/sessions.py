@@ -460,7 +460,12 @@ _SHOWN = (
         _finals,
         2,
     ),
-    _text(tr("State"), tr("Check lists what is damaged; Repair copies the rest"), _state, 1),
+    _text(
+        tr("State"),
+        tr("Check lists what is damaged; Repair copies the rest"),
+        lambda e: tr("{}, simulated").format(_state(e)) if e.is_simulated else _state(e),
+        1,
+    ),
     _text(tr("Notes"), tr("The beginning of the notes"), lambda e: e.notes, 7),
     _text(tr("Plan"), tr("The plan that was followed"), lambda e: e.plan, 8),
     _Shown(

@@ -118,7 +118,8 @@ class _Model(QAbstractTableModel):
             case Qt.ItemDataRole.AccessibleDescriptionRole if place == 0:
                 return row.picture_text
             case Qt.ItemDataRole.ToolTipRole:
-                hidden = (f"{self.columns[i].title}: {texts[i]}" for i in self.hidden)
+                titles = ((i, self.columns[i].title.replace("\n", " ")) for i in self.hidden)
+                hidden = (f"{title}: {texts[i]}" for i, title in titles)
                 text = texts[place] if place < len(texts) and row.key is not None else ""
                 lines = text, row.tooltip or column.tooltip, *hidden
                 return plain_tooltip("\n".join(filter(None, lines)))
@@ -132,8 +133,9 @@ class _Model(QAbstractTableModel):
         if not self.columns[place].is_number:
             return _LEFT
         # On the right, a number would run into the text of the next column.
-        is_before_text = not all(one.is_number for one in self.columns[place + 1 : place + 2])
-        return _CENTRE if is_before_text else _RIGHT
+        shown = (i for i in range(place + 1, len(self.columns)) if i not in self.hidden)
+        following = next(shown, place)
+        return _RIGHT if self.columns[following].is_number else _CENTRE
 
     def headerData(
         self,
@@ -307,12 +309,6 @@ class Table(QTableView):
         """Allow or forbid deleting."""
         self._is_read_only = is_read_only
         self._note_chosen()
-
-    @property
-    def whole_height_px(self) -> int:
-        """The height at which no row needs scrolling."""
-        rows_px = self.verticalHeader().length() + self.horizontalHeader().sizeHint().height()
-        return rows_px + 2 * self.frameWidth()
 
     def as_text(self) -> str:
         """Return the table as tab-separated lines, with a line of headings first."""

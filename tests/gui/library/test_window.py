@@ -183,12 +183,15 @@ def test_what_is_known_of_a_session_stands_in_its_columns() -> None:
         plan="recommended",
         eye_distance_m=0.0634,
         notes="Glasses off",
+        is_finished=True,
+        is_simulated=True,
     )
     titles = [column.title for column in COLUMNS]
     cells = dict(zip(titles, session_row(entry).cells, strict=True))
     assert cells["Final φ"] == "Left set by hand"
     assert (cells["Plan"], cells["Eyes mm"]) == ("recommended", "63.4")
     assert (cells["Notes"], cells["Session"]) == ("Glasses off", "one")
+    assert cells["State"] == "Finished, simulated"
     assert all(column.tooltip for column in COLUMNS)
     assert is_of(entry, "accepted")
 
