@@ -7,12 +7,12 @@ from dataclasses import replace
 from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QCheckBox, QComboBox, QDialog, QDialogButtonBox, QWidget
 
-from handcal.bridge.bridges import BridgeSettings
 from handcal.station.checks.preflight import gate_problem
 from handcal_gui.app.preferences import Preferences, Theme
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
 from handcal_gui.calibrate.start.calibration_fields import CalibrationFields
+from handcal_gui.widgets.entries_form import Bound
 from handcal_gui.widgets.fields import (
     choice,
     make_equally_wide,
@@ -98,6 +98,17 @@ class PreferencesDialog(QDialog):
             | QDialogButtonBox.StandardButton.Cancel
             | QDialogButtonBox.StandardButton.RestoreDefaults
         )
+        self._bound = Bound(
+            {
+                "theme": self._theme,
+                "bridges.slicer_host": self._slicer,
+                "bridges.slicer_port": self._port,
+                "bridges.lsl": self._lsl,
+                "station.sessions": self._sessions,
+                "station.calibration.solve.verdict.target_arcmin": self._target,
+            },
+            parent=self,
+        )
         self._lay_out()
         self._show(preferences)
         self._calibration.changed.connect(self._refresh)
@@ -105,34 +116,24 @@ class PreferencesDialog(QDialog):
 
     def preferences(self) -> Preferences:
         """Return the preferences with the values shown."""
-        station = self._preferences.station
-        calibration = self._calibration.take(station.calibration)
-        solve = calibration.solve
-        verdict = replace(solve.verdict, target_arcmin=self._target.value())
+        shown = self._bound.take(self._preferences)
+        station = shown.station
         learned = self._learn.currentData().split()
-        return replace(
-            self._preferences,
-            theme=self._theme.currentData(),
-            bridges=BridgeSettings(
-                self._slicer.currentData(), self._port.value(), self._lsl.isChecked()
-            ),
-            station=replace(
-                station,
-                sessions=self._sessions.path or station.sessions,
-                learn_prior="eyes" in learned,
-                use_far_prior="far" in learned,
-                learn_wearers="wearers" in learned,
-                calibration=replace(calibration, solve=replace(solve, verdict=verdict)),
-            ),
+        station = replace(
+            station,
+            sessions=station.sessions or self._preferences.station.sessions,
+            learn_prior="eyes" in learned,
+            use_far_prior="far" in learned,
+            learn_wearers="wearers" in learned,
+            calibration=self._calibration.take(station.calibration),
         )
+        return replace(shown, station=station)
 
     def _show(self, preferences: Preferences) -> None:
         """Show the values of preferences."""
-        station, bridges = preferences.station, preferences.bridges
-        self._theme.setCurrentIndex(self._theme.findData(preferences.theme))
-        self._sessions.set_path(station.sessions)
+        station = preferences.station
+        self._bound.show(preferences)
         self._calibration.show_settings(station.calibration)
-        self._target.setValue(station.calibration.solve.verdict.target_arcmin)
         words = {
             "eyes": station.learn_prior,
             "far": station.use_far_prior,
@@ -140,10 +141,7 @@ class PreferencesDialog(QDialog):
         }
         learned = " ".join(word for word, is_set in words.items() if is_set)
         self._learn.setCurrentIndex(max(0, self._learn.findData(learned)))
-        self._slicer.setCurrentIndex(self._slicer.findData(bridges.slicer_host))
-        self._port.setValue(bridges.slicer_port)
-        self._port.setEnabled(bool(bridges.slicer_host))
-        self._lsl.setChecked(bridges.lsl)
+        self._port.setEnabled(bool(preferences.bridges.slicer_host))
 
     def _refresh(self) -> None:
         """Show what is wrong with the depth gate, and allow OK unless something is refused."""

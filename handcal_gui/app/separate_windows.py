@@ -216,8 +216,8 @@ class SeparateWindows(QObject):
             self._window.banner.show_message(str(error))
             return None
         read = partial(read_manual, self._window)
-        wizard = RigWizard(folder, self._window, self._start.new.settings.realsense, read)
-        wizard.rig_saved.connect(self._use_rig)
+        realsense = self._start.new.settings.realsense
+        wizard = RigWizard(folder, self._window, realsense, read, self._use_rig)
         wizard.finished.connect(self._start.new.check)
         self._open(wizard, wizard.accept)
         return wizard

@@ -29,7 +29,7 @@ from handcal_gui.app.theme import SPACING_PX, scale_font
 from handcal_gui.app.translation import tr
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.evaluate.entries import CubeEntries
-from handcal_gui.evaluate.preparation import PreparationDialog
+from handcal_gui.evaluate.evaluation_page import PreparationDialog
 from handcal_gui.widgets.action_strip import one_of_strips
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, main_button, paragraph, whole_number, with_name

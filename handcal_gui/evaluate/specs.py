@@ -25,8 +25,7 @@ from handcal.session.record import replay
 from handcal_gui.app.translation import tr
 from handcal_gui.evaluate.capture_dialog import MOST_POSES, CaptureDialog
 from handcal_gui.evaluate.entries import CubeEntries, UserEntries
-from handcal_gui.evaluate.evaluation_page import EvaluationSpec
-from handcal_gui.evaluate.preparation import Preparation
+from handcal_gui.evaluate.evaluation_page import EvaluationSpec, Preparation
 from handcal_gui.evaluate.track_dialog import TrackDialog
 from handcal_gui.evaluate.trials_dialog import TrialsDialog
 from handcal_gui.evaluate.work import FileEvaluation, StudyEvaluation

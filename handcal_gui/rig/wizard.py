@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Protocol
 
-from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QGuiApplication, QIcon, QKeyEvent
 from PySide6.QtWidgets import (
     QDialog,
@@ -101,17 +102,13 @@ class RigWizard(QDialog):
         Project folder; a later wizard resumes from it.
     realsense : RealSenseSettings, optional
         Settings of a RealSense used to take images.
-    read : callable
-        Shows a page of the manual.
+    read, use : callable
+        Show a page of the manual, and take a rig file for the next calibration.
 
     Attributes
     ----------
-    rig_saved : Signal(Path)
-        Rig file to use for the next calibration.
     project : RigProject
     """
-
-    rig_saved = Signal(object)
 
     def __init__(
         self,
@@ -119,6 +116,7 @@ class RigWizard(QDialog):
         parent: QWidget | None = None,
         realsense: RealSenseSettings | None = None,
         read: Callable[[str], object] = lambda _page: None,
+        use: Callable[[Path], object] = lambda _rig: None,
     ) -> None:
         super().__init__(parent)
         self.setObjectName("rigWizard")
@@ -128,7 +126,7 @@ class RigWizard(QDialog):
         self._rail = with_name(QListWidget(), "rigRail", tr("Steps"))
         self._title, self._purpose = QLabel(), paragraph("rigPurpose")
         self._stack, self._strips = QStackedWidget(), QStackedWidget()
-        result = ResultPage(self.project, read)
+        result = ResultPage(self.project, read, use)
         self._pages: list[RigPage] = []
         for page in (
             BoardPage(self.project),
@@ -156,7 +154,6 @@ class RigWizard(QDialog):
         self.project.rig_changed.connect(self._refresh)
         self.project.inputs_changed.connect(self._refresh)
         self.project.failed.connect(self._banner.show_message)
-        result.rig_saved.connect(self.rig_saved)
         self._banner.show_message(self.project.complaint)
         screen = QGuiApplication.primaryScreen().availableSize()
         self.resize(screen.boundedTo(_FIRST_SIZE))

@@ -310,12 +310,6 @@ class Table(QTableView):
         self._is_read_only = is_read_only
         self._note_chosen()
 
-    @property
-    def whole_height_px(self) -> int:
-        """The height at which no row needs scrolling."""
-        rows_px = self.verticalHeader().length() + self.horizontalHeader().sizeHint().height()
-        return rows_px + 2 * self.frameWidth()
-
     def as_text(self) -> str:
         """Return the table as tab-separated lines, with a line of headings first."""
         lines = [[column.title for column in self._model.columns], *self._model.texts]

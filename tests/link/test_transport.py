@@ -46,4 +46,4 @@ def see(monkeypatch: pytest.MonkeyPatch, own: Sequence[str | tuple[str, int, int
 
     ips = [IP(one, 64, "eth0") for one in own]
     monkeypatch.setattr(transport, "local_address", fail)
-    monkeypatch.setattr(transport, "get_adapters", lambda: [Adapter("eth0", "eth0", ips)])
+    monkeypatch.setattr("ifaddr.get_adapters", lambda: [Adapter("eth0", "eth0", ips)])
