@@ -11,9 +11,8 @@ from handcal.calibration.solve_again import solve_sound, stored_solve_settings
 from handcal.core.display import projection_matrix
 from handcal.core.progress import Progress
 from handcal.core.types import Eye, Float64, Projection
-from handcal.register.benefit import expected_arcmin
 from handcal.register.results import Results, SolveSettings
-from handcal.session.drawn import DrawnShift, ShiftKind, drawn_shifts
+from handcal.session.drawn import DrawnShift, ShiftKind, drawn_error_arcmin, drawn_shifts
 from handcal.session.record import eye_trials
 from handcal.session.session import SessionRecord
 from handcal.session.trial import SAME_SHIFT_M, EyeTrials
@@ -71,13 +70,8 @@ class SessionOutcome:
         """Return the error expected of drawing with a φ of the eye; None if nothing is solved."""
         if self.results is None or eye not in self.results.eyes:
             return None
-        benefit, solved = self.results.benefits[eye], self.results.eyes[eye]
-        if kind == "solved":
-            return benefit.after_arcmin
-        if kind == "offline":
-            return benefit.without_arcmin
-        apart_m = solved.shift_m - self.drawn[eye].shift_m
-        return expected_arcmin(self.record.rig.eyes[eye], apart_m, solved.covariance_m2)
+        shift = DrawnShift(kind, self.shifts_m[eye][kind], is_drawn=self.is_applied(eye, kind))
+        return drawn_error_arcmin(self.results, self.record.rig.eyes[eye], eye, shift)
 
     def projection(self, eye: Eye, kind: ShiftKind | None = None) -> Projection:
         """Return the projection of an eye for one of its φ, by default the final one."""

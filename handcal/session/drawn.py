@@ -7,7 +7,8 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from handcal.core.types import EYES, Eye, Float64
+from handcal.core.types import EYES, Eye, EyeDisplay, Float64
+from handcal.register.benefit import expected_arcmin
 from handcal.register.results import Results, read_rendered_shift_m, read_solved_shift_m
 from handcal.session.record import SessionRecord
 from handcal.session.state import SessionState
@@ -64,6 +65,16 @@ def drawn_shifts(
             kind = "set by hand"
         drawn[eye] = DrawnShift(kind, shift_m, _is_same(shift_m, applied_m))
     return drawn
+
+
+def drawn_error_arcmin(results: Results, display: EyeDisplay, eye: Eye, drawn: DrawnShift) -> float:
+    """Return the error to expect of a solved eye that is drawn with its final φ."""
+    benefit, solved = results.benefits[eye], results.eyes[eye]
+    if drawn.kind == "solved":
+        return benefit.after_arcmin
+    if drawn.kind == "offline":
+        return benefit.without_arcmin
+    return expected_arcmin(display, solved.shift_m - drawn.shift_m, solved.covariance_m2)
 
 
 def _is_same(shift_m: Float64, other_m: Float64 | None) -> bool:

@@ -233,5 +233,5 @@ def _head(record: SessionRecord) -> Mapping[str, str]:
         tr("Wearer"): record.wearer or tr("without a name"),
         tr("Session"): record.path.name,
         **session_facts(record),
-        tr("Made with"): f"handcal {version('handcal')}",
+        tr("Made with"): tr("handcal {}").format(version("handcal")),
     }

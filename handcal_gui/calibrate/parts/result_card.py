@@ -10,10 +10,9 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPalette, QPen
 from PySide6.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
 from handcal.core.types import EYES, Eye, phi_text
-from handcal.register.benefit import expected_arcmin
 from handcal.register.results import USED, Results
 from handcal.report.cells import signed
-from handcal.session.drawn import DrawnShift, drawn_shifts
+from handcal.session.drawn import DrawnShift, drawn_error_arcmin, drawn_shifts
 from handcal.session.record import SessionRecord, eye_trials
 from handcal.session.trial import EyeTrials, is_doubted
 from handcal_gui.app.theme import SPACING_PX, colors, follow_theme, scale_font
@@ -117,10 +116,7 @@ def _drawn(results: Results, record: SessionRecord, eye: Eye, drawn: DrawnShift)
     is_as_judged = (drawn.kind == "solved") == (results.verdicts[eye].name in USED)
     if is_as_judged and drawn.kind in ("solved", "offline"):
         return text
-    shift = results.eyes[eye]
-    arcmin = expected_arcmin(
-        record.rig.eyes[eye], drawn.shift_m - shift.shift_m, shift.covariance_m2
-    )
+    arcmin = drawn_error_arcmin(results, record.rig.eyes[eye], eye, drawn)
     return tr("{}; {:.1f}′ expected").format(text, arcmin)
 
 
