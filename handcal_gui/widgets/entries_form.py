@@ -69,7 +69,7 @@ class EntriesForm(QWidget):
 
 
 class _Kind(NamedTuple):
-    """How a kind of field tells a change, shows a value, and gives the one entered."""
+    """Functions that tell a change of a kind of field, show a value, and give the one entered."""
 
     change: Callable[[Any], Any]
     show: Callable[[Any, Any], object]
