@@ -43,7 +43,8 @@ LEFT_HANDED = np.diag([1.0, 1.0, -1.0, 1.0])
 
 
 def scaled(K: Float64, factor: float) -> Float64:
-    return K * np.array([[factor, 1.0, 1.0], [1.0, factor, 1.0], [1.0, 1.0, 1.0]])
+    factors: Float64 = np.array([[factor, 1.0, 1.0], [1.0, factor, 1.0], [1.0, 1.0, 1.0]])
+    return K * factors
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from handcal.calibration.states import State
 from handcal.core.types import EYES, Eye, Rig
 from handcal.register.results import Results
 from handcal.session.session import Session, SessionRecord
-from handcal.session.trial import Comparison, make_trial
+from handcal.session.trial import Comparison, Drawing, make_trial
 from handcal.station.snapshot import Snapshot
 from handcal_gui.calibrate.fine_tune.panel import FineTunePanel
 from handcal_gui.calibrate.trials.comparison_row import ComparisonRow
@@ -225,15 +225,16 @@ def test_a_comparison_is_begun_answered_once_both_were_shown_and_counted(
     panel.show_snapshot(snapshot(State.APPLIED, comparing="first"))
     assert not child(row, QPushButton, "answer-first").isEnabled()
     child(row, QPushButton, "show-second").click()
-    engine.station.trials.comparing.show.assert_called_once_with("second")
+    engine.station.trials.show_compared.assert_called_once_with("second")
     panel.show_snapshot(snapshot(State.APPLIED, comparing="second", has_compared_both=True))
     child(row, QPushButton, "answer-second").click()
-    engine.station.trials.comparing.answer.assert_called_once_with("second")
+    engine.station.trials.answer.assert_called_once_with("second")
     child(row, QPushButton, "compareEnd").click()
-    engine.station.trials.comparing.end.assert_called_once()
+    engine.station.trials.end_comparison.assert_called_once()
     with Session(record.path) as session:
-        for first, answer in (("offline", "second"), ("applied", "second"), ("offline", "second")):
-            session.save_comparison(Comparison(first, answer, {"left": np.zeros(3)}))
+        firsts: tuple[Drawing, ...] = ("offline", "applied", "offline")
+        for first in firsts:
+            session.save_comparison(Comparison(first, "second", {"left": np.zeros(3)}))
         session.save_comparison(Comparison("offline", "neither", {"left": np.zeros(3)}))
     panel.show_record(Session.open(record.path))
     assert text(panel, "summary").splitlines()[-1] == (

@@ -27,7 +27,7 @@ def test_the_station_shows_and_takes_the_answers_of_a_comparison(
     guide.show_snapshot(seen)
     assert child(guide, QLabel, "compareAsk").isVisible()
     child(guide, QPushButton, "answer-first").click()
-    engine.station.trials.comparing.answer.assert_called_once_with("first")
+    engine.station.trials.answer.assert_called_once_with("first")
     window.use_arrangement("panels")
     guide.show_snapshot(seen)
     assert not guide.comparison.isVisible(), "the panel has them"
