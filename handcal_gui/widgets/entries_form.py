@@ -130,7 +130,7 @@ def _with(settings: Any, changes: Mapping[str, Any]) -> object:
 
 
 class _Kind(NamedTuple):
-    """A kind of field: its signal of a change, and how it shows and returns a value."""
+    """Functions that tell a change of a kind of field, show a value, and give the one entered."""
 
     change: Callable[[Any], Any]
     show: Callable[[Any, Any], object]
