@@ -49,7 +49,7 @@ class ImagesPanel(QWidget):
     Parameters
     ----------
     project : RigProject
-        Is told of the board if it is found, and takes another that the images show.
+        Learns that its board was found, and takes another that the images show.
     titles : sequence of str
         Name of the camera, or names of the two cameras of pairs.
     hint : str

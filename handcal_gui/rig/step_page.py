@@ -99,7 +99,7 @@ class StepPage(QWidget):
 
     @property
     def entries(self) -> Any:
-        """What is entered for this step."""
+        """The entries of this step."""
         return getattr(self.project.inputs, self._entries_name)
 
     def board_of(self, panel: ImagesPanel) -> Board | None:

@@ -130,7 +130,7 @@ def _with(settings: Any, changes: Mapping[str, Any]) -> object:
 
 
 class _Kind(NamedTuple):
-    """How a kind of field tells a change, shows a value, and gives the one entered."""
+    """Functions that tell a change of a kind of field, show a value, and give the one entered."""
 
     change: Callable[[Any], Any]
     show: Callable[[Any, Any], object]

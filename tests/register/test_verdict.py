@@ -191,7 +191,7 @@ def test_an_eye_that_alignments_cannot_decide_is_to_be_verified_again() -> None:
 
 @pytest.mark.parametrize("target_arcmin", [2.0, 8.0, 20.0])
 def test_no_error_is_foreseen_that_is_not_less_than_now(target_arcmin: float) -> None:
-    """What is missing may be certainty; then no error is said."""
+    """Certainty may be what is missing; then no error is said."""
     uncertain = replace(
         GOOD,
         shift_m=np.array([0.0025, 0.0, 0.003]),

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from PySide6.QtCore import QEvent, QObject, QSize
+from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
@@ -68,29 +68,6 @@ def test_a_size_is_that_of_the_window_although_it_was_maximized_when_closed(
     monkeypatch.setattr(qapp, "exec", look)
     launch.launch(qapp, arguments, first)
     assert seen == [(False, arguments.size)]
-
-
-class _Windows(QObject):
-    """Names the windows that are shown, over all of the application."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.shown: list[str] = []
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() is QEvent.Type.Show and isinstance(watched, QWidget) and watched.isWindow():
-            self.shown.append(watched.objectName() or type(watched).__name__)
-        return False
-
-
-def test_no_part_of_the_window_is_shown_before_it(qtbot: QtBot, tmp_path: Path) -> None:
-    windows, app = _Windows(), QApplication.instance()
-    assert app is not None
-    app.installEventFilter(windows)
-    program = Program(PreferencesFile(tmp_path / "preferences.json"))
-    app.removeEventFilter(windows)
-    qtbot.addWidget(program.window)
-    assert windows.shown == []
 
 
 @pytest.mark.process

@@ -16,7 +16,7 @@ from handcal.station.settings import StationSettings
 from handcal_gui.calibrate.guide.view import Action
 from handcal_gui.widgets.times import session_time
 from tests.gui.app.program.technician import Technician, is_turned, shown_preconditions
-from tests.gui.helpers import button
+from tests.gui.helpers import button, child
 
 
 def with_plan(settings: StationSettings) -> StationSettings:
@@ -75,10 +75,10 @@ def test_the_station_follows_its_plan_from_begin_to_a_verification(
     solved_m = technician.snapshot.procedure.applied_shift_m["left"]
     assert solved_m.any()
 
-    fact = technician.child(QLabel, "wizardFact")
+    final = child(program.wizard_panel, QLabel, "card-drawn-left")
     QTest.keyClick(program.window, Qt.Key.Key_G, Qt.KeyboardModifier.ShiftModifier)
     technician.wait(lambda: not technician.snapshot.procedure.applied_shift_m["left"].any())
-    technician.wait(lambda: "saved and exported" in fact.text())
+    technician.wait(lambda: final.text().startswith("Final φ: offline"))
     assert program.wizard_panel.wizard.is_held
     QTest.keyClick(program.window, Qt.Key.Key_G)
     technician.wait(
@@ -96,8 +96,8 @@ def test_the_station_follows_its_plan_from_begin_to_a_verification(
     technician.wait(lambda: technician.snapshot.session_path != path)
     assert technician.record.facts.former == path.name
     assert technician.record.wearer == "Ada"
-    assert f"The former result is used again ({session_time(path.name)})" in fact.text()
-    assert path.name not in fact.text()
+    assert f"The former result is used again ({session_time(path.name)})" in wizard_fact.text()
+    assert path.name not in wizard_fact.text()
     begin(technician, studio)
     program.wizard_panel.hold(False)
     technician.wait_for_state(State.VERIFY)

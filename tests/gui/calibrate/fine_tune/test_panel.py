@@ -80,7 +80,7 @@ def solved(results: Results) -> Shifts:
     return {eye: results.eyes[eye].shift_m for eye in EYES}
 
 
-def test_shows_what_the_headset_renders_with_and_begins_anew_with_a_session(
+def test_shows_what_the_headset_renders_with_and_begins_again_with_a_session(
     panel: FineTunePanel, show: Show, results: Results, rig: Rig
 ) -> None:
     assert "starts with a session" in status(panel)
