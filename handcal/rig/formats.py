@@ -152,7 +152,7 @@ def read_stereo(path: Path) -> StereoCalibration:
 
 @dataclass(frozen=True, slots=True)
 class _StoredCamera:
-    """What is read of a camera's JSON."""
+    """The fields of a camera's JSON that are read."""
 
     width: int
     height: int
@@ -166,7 +166,7 @@ class _StoredCamera:
 
 @dataclass(frozen=True, slots=True)
 class _StoredStereo:
-    """What is read of a stereo calibration's JSON, beside the pose."""
+    """The fields of a stereo calibration's JSON that are read, beside the pose."""
 
     covariance: Float64 | None
     depth: _StoredCamera

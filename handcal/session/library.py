@@ -416,7 +416,7 @@ class UnfinishedSession:
     problem: str = ""
     """Reason why it cannot be resumed, such as another program; empty if it can."""
     advice: str = ""
-    """What to do about it, if the reason tells."""
+    """Advice, if the reason gives one; empty if none."""
     is_repaired: bool = False
     """True if a repaired copy of this damaged session is in the same folder."""
 
