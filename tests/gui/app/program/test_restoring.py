@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import base64
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QByteArray
-from PySide6.QtWidgets import QComboBox, QMainWindow, QSpinBox
+from PySide6.QtWidgets import QComboBox, QSpinBox
 from pytestqt.qtbot import QtBot
 
 from handcal.station.settings import StationSettings
@@ -16,32 +14,21 @@ from handcal_gui.app import separate_windows
 from handcal_gui.app.preferences import HIDDEN_LAYERS, Preferences, PreferencesFile
 from handcal_gui.app.preferences_dialog import PreferencesDialog
 from handcal_gui.app.program import Program
-from handcal_gui.calibrate.window import MainWindow
 from tests.gui.helpers import child
 
 
-def test_layouts_are_restored_before_the_window_is_maximized(
-    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Else Qt keeps each layout, with tab bars that are deleted meanwhile, and crashes."""
-    left = QMainWindow()
-    qtbot.addWidget(left)
-    left.showMaximized()
-    geometry = base64.b64encode(left.saveGeometry().data()).decode()
+def test_a_maximized_window_and_its_layout_are_restored(qtbot: QtBot, tmp_path: Path) -> None:
     file = PreferencesFile(tmp_path / "preferences.json")
-    file.save(Preferences(geometry=geometry))
-    states: list[bool] = []
-
-    def restore(window: MainWindow, state: QByteArray, version: int = 0) -> bool:
-        states.append(window.isMaximized())
-        return QMainWindow.restoreState(window, state, version)
-
-    monkeypatch.setattr(MainWindow, "restoreState", restore)
     program = Program(file)
     qtbot.addWidget(program.window)
-    assert states
-    assert not any(states)
+    program.window.showMaximized()
+    layout = program.window.layout_text().replace('"chosen": {}', '"chosen": {"cloud": true}')
+    program.window.restore_layout(layout)
+    program.close()
+    program = Program(file)
+    qtbot.addWidget(program.window)
     assert program.window.isMaximized()
+    assert program.window.layout_text() == layout
     program.close()
 
 
