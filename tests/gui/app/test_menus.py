@@ -68,7 +68,7 @@ def test_results_are_copied_once_there_are_some(
     window.show_page("review")
     window.panels.results.show_results(results, record, 8.0)
     assert [text.partition("\t")[0] for text in offered(window)] == ["Copy: Results"]
-    window.panels.results.show_results(None, {})
+    window.panels.results.show_results(None, None)
     assert not offered(window)
 
 
