@@ -15,7 +15,7 @@ from pathlib import Path
 
 import handcal
 from handcal.camera.images import write_frame
-from handcal.cli.segmentation_file import write_segmentation
+from handcal.cli.recordings import write_segmentation
 from handcal.cli.terminal import errors_in_one_line
 from handcal.sim.camera import simulated_frame
 

@@ -30,8 +30,8 @@ from handcal.core.errors import HandcalError
 from handcal.core.geometry import rigid
 from handcal.core.types import CameraIdentity, Frame
 from handcal.io.closable import Closable
-from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.bench.speed import noisy_frames
+from handcal.lab.bench.trials import BenchFigure
 from handcal.link.pairing import new_pairing_key
 from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import UdpTransport

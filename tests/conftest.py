@@ -58,7 +58,7 @@ _NOT_QUICK = "window", "process", "slow", "campaign"
 _LONG = {
     "tests/cli/test_accept.py",
     "tests/cli/test_study.py",
-    "tests/lab/bench/test_offline.py",
+    "tests/lab/bench/test_accuracy.py",
     "tests/lab/bench/test_run.py",
     "tests/register/test_consistent.py",
     "tests/rig/boards/test_board.py",

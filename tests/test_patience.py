@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import time
 
 import pytest
 
 from tests import helpers
-from tests.helpers import Patience, _slowness_of, output_of
+from tests.helpers import Patience, _slowness_of
 
 
 def test_a_second_counts_by_the_share_that_the_threads_got() -> None:
@@ -34,18 +32,3 @@ def test_a_limit_is_reached_later_on_a_busy_machine(
     while not patience.is_over():
         now_s += 1.0
     assert now_s == 3.0 * slowness
-
-
-@pytest.mark.process
-def test_the_output_of_a_program_that_ends_is_returned_and_one_that_hangs_fails() -> None:
-    def start(code: str) -> subprocess.Popen[str]:
-        pipe = subprocess.PIPE
-        return subprocess.Popen([sys.executable, "-c", code], stdout=pipe, stderr=pipe, text=True)
-
-    assert output_of(start("print('made')"), 60.0) == ("made\n", "")
-    with start("import threading; threading.Event().wait()") as hanging:
-        try:
-            with pytest.raises(AssertionError, match="did not end"):
-                output_of(hanging, 0.1)
-        finally:
-            hanging.kill()

@@ -7,7 +7,18 @@ from pathlib import Path
 
 from handcal.cli.boards import BOARD_OPTIONS, GRID_OPTION, board_of
 from handcal.cli.output import console, save, show_progress, table, triple
-from handcal.cli.terminal import arg, command, file_option, folder_option, number, seed, value
+from handcal.cli.terminal import (
+    arg,
+    command,
+    eyes_of,
+    eyes_option,
+    file_option,
+    folder_option,
+    number,
+    seed,
+    settings_of,
+    value,
+)
 from handcal.core.errors import HandcalError
 from handcal.core.types import EYES, RigPart
 from handcal.io.files import make_folder
@@ -28,7 +39,7 @@ _HOW: dict[RigPart, str] = {
         "headset tracks the board",
     ),
     file_option("--rig", "rig file to accept", required=True),
-    arg("--eyes", choices=("both", *EYES), default="both", help="eyes to check"),
+    eyes_option("eyes to check"),
     file_option(
         "--camera-intrinsics", "intrinsics of the viewpoint camera (default: FOLDER/camera.json)"
     ),
@@ -60,37 +71,33 @@ def accept(arguments: argparse.Namespace) -> None:
         view_rows,
     )
 
-    settings = AcceptanceSettings(
-        arguments.folder,
-        arguments.rig,
-        arguments.output,
-        board_of(arguments),
-        arguments.square_px,
-        EYES if arguments.eyes == "both" else (arguments.eyes,),
-        arguments.camera_intrinsics,
-        arguments.depth_intrinsics,
-        arguments.limit_arcmin,
+    settings = settings_of(
+        AcceptanceSettings,
+        arguments,
+        board=board_of(arguments),
+        eyes=eyes_of(arguments),
+        camera=arguments.camera_intrinsics,
+        depth_camera=arguments.depth_intrinsics,
     )
     with show_progress() as progress:
         found = run_acceptance(settings, progress)
     save(arguments.json, found.json(settings.limit_arcmin))
     for name, why in found.left_out.items():
-        console.print(f"Left out: {name}: {why}", markup=False)
+        console.print(f"Left out: {name}: {why}")
     shown = table("eye", "distance, m", "corners", "mean, arcmin", "largest, arcmin")
     for eye, one in found.eyes.items():
         for row in view_rows(one):
             shown.add_row(eye, *row)
     console.print(shown)
     for file in found.files:
-        console.print(str(file), markup=False)
+        console.print(str(file))
     for eye, one in found.eyes.items():
         console.print(
             f"{eye}: {found.problems[eye] or 'passed'}; {one.mean_arcmin:.1f}′ on average, camera "
-            f"{triple(1e3 * one.shift_m)} mm from C0",
-            markup=False,
+            f"{triple(1e3 * one.shift_m)} mm from C0"
         )
     if found.move is not None:
-        console.print(f"depth camera: {found.move.words}, by tracked boards", markup=False)
+        console.print(f"depth camera: {found.move.words}, by tracked boards")
     if found.cause.words:
         how = "; ".join(dict.fromkeys(_HOW[part] for part in found.cause.again))
         raise HandcalError(f"the rig fails: {found.cause.words}{how and f' ({how})'}")
@@ -146,4 +153,4 @@ def simulate(arguments: argparse.Namespace) -> None:
         )
     lines.append("Acceptance: images for 'handcal rig accept' in accept")
     for line in lines:
-        console.print(line, markup=False)
+        console.print(line)

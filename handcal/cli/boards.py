@@ -88,7 +88,7 @@ def show_views(views: Iterable[BoardImage], residuals_px: Mapping[str, float]) -
         console.print(shown)
     for view in views:
         if view.problem:
-            console.print(f"{view.name}: {view.problem}", markup=False)
+            console.print(f"{view.name}: {view.problem}")
 
 
 def show_verdict(verdict: CalibrationVerdict) -> None:

@@ -1,36 +1,20 @@
-"""``handcal record, replay, segment``: cameras, recordings and single images."""
+"""``handcal record``, and the cameras and recordings that other commands open."""
 
 from __future__ import annotations
 
 import argparse
-import re
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, get_args
 
-from handcal.camera.images import DEPTH_SCALES_M
 from handcal.camera.settings import Preset, Profile, RealSenseSettings
-from handcal.cli.output import console, save, show_progress, table, until_interrupted
-from handcal.cli.terminal import (
-    arg,
-    command,
-    fail,
-    file_option,
-    flag,
-    folder_option,
-    number,
-    seed,
-    value,
-)
+from handcal.cli.output import console, save, show_progress, until_interrupted
+from handcal.cli.terminal import arg, command, fail, flag, number, seed, settings_of, value
 from handcal.core.errors import HandcalError
-from handcal.hand.settings import Roi
-from handcal.io.files import make_folder
 
 if TYPE_CHECKING:
     from handcal.camera.camera import Camera
     from handcal.camera.playback import PlayedCamera
-    from handcal.cli.replay import ReplayStep
-
 
 _POSITIVE = number(float, 0.0, 1e6)
 REALSENSE_OPTIONS = (
@@ -58,25 +42,6 @@ REALSENSE_OPTIONS = (
 """One for every field of `RealSenseSettings`."""
 
 
-def _depth_scale(text: str) -> float:
-    """Convert metres per unit; units per metre, as Open3D and TUM give them, get a hint."""
-    try:
-        return number(float, *DEPTH_SCALES_M)(text)
-    except argparse.ArgumentTypeError as error:
-        if not re.fullmatch(r"[1-9]\d{2,5}(\.0*)?", text):
-            raise
-        hint = f"enter {1.0 / float(text):g} if a metre is {text} units"
-        raise argparse.ArgumentTypeError(f"{error}; {hint}") from error
-
-
-_ROI = arg(
-    "--roi",
-    choices=get_args(Roi),
-    default="detector",
-    help="search region: detector, the hand that the detector finds in the colour image (the "
-    "nearest of several); left or right, the leftmost or rightmost of them; depth, the nearest "
-    "hand-sized object, without the detector",
-)
 GATE = arg(
     "--gate",
     nargs=2,
@@ -116,7 +81,7 @@ def record(arguments: argparse.Namespace) -> None:
         until_interrupted() as is_stopped,
     ):
         said = f"Recording {camera.name}; press Ctrl+C to stop and keep the recording."
-        console.print(said, markup=False)
+        console.print(said)
         try:
             with show_progress(is_stopped) as progress:
                 recorded = record_camera(camera, arguments.output, settings, progress)
@@ -129,84 +94,9 @@ def record(arguments: argparse.Namespace) -> None:
     )
 
 
-@command(
-    arg("recording", type=Path, help=".db3 or .bag file, or a recorded folder"),
-    flag("--real-time", "play at the recorded frame rate, dropping frames"),
-    _ROI,
-    GATE,
-    json=True,
-)
-def replay(arguments: argparse.Namespace) -> None:
-    """Play a recording and segment the hand in every frame."""
-    from handcal.camera.playback import PlaybackSettings
-    from handcal.camera.recordings import open_recording
-    from handcal.cli.replay import replay as play
-    from handcal.hand.settings import SegmentSettings
-
-    shown_table = table("frame", "points", "depth, m", "rotation, °", "shift, mm", "time, ms")
-    rows: list[dict[str, Any]] = []
-    playback = PlaybackSettings(real_time=arguments.real_time)
-    with open_recording(arguments.recording, playback) as camera:
-        segmenting = SegmentSettings(arguments.roi, *gate_of(arguments, camera))
-        for step in play(camera, segmenting):
-            rows.append(_replay_row(step))
-            shown = list(rows[-1].values())[:-2]
-            shown_table.add_row(*map(_cell, shown))
-    console.print(shown_table)
-    save(arguments.json, {"frames": rows, "notes": list(camera.notes)})
-    for note in camera.notes:
-        console.print(f"The recording: {note}", markup=False)
-    without = sum(not row["color"] for row in rows)
-    if without:
-        console.print(f"{without} of {len(rows)} frames have no colour: found by depth alone.")
-    for row in rows:
-        if row["problem"]:
-            console.print(f"Frame {row['frame']}: {row['problem']}")
-    found = sum(not row["problem"] for row in rows)
-    console.print(f"{found} of {len(rows)} frames show a hand.")
-
-
-@command(
-    file_option("--color", "colour image", required=True),
-    file_option("--depth", "16-bit PNG, TIFF or PGM, aligned to the colour image", required=True),
-    file_option(
-        "--intrinsics",
-        "JSON with width, height, fx, fy, cx, cy, and depth_scale in metres per unit; or a file of "
-        "another program",
-        required=True,
-    ),
-    value(
-        "--depth-scale",
-        _depth_scale,
-        "M",
-        "metres per unit of depth (default: as the file of intrinsics says)",
-    ),
-    folder_option("--output", "folder for the results", required=True),
-    _ROI,
-    GATE,
-)
-def segment(arguments: argparse.Namespace) -> None:
-    """Segment the hand in one image pair: cloud, contour, mask and overlay."""
-    from handcal.camera.images import read_frame
-    from handcal.cli.segmentation_file import write_segmentation
-    from handcal.hand.settings import SegmentSettings
-    from handcal.hand.shipped import make_finder
-
-    frame = read_frame(
-        arguments.color, arguments.depth, arguments.intrinsics, arguments.depth_scale
-    )
-    cloud = make_finder(SegmentSettings(arguments.roi, *gate_of(arguments))).find(frame)
-    write_segmentation(cloud, frame, make_folder(arguments.output))
-    console.print(
-        f"{len(cloud.points_m)} points at {cloud.median_depth_m:.3f} m, "
-        f"box {', '.join(map(str, cloud.box_px))} px. Results: {arguments.output}"
-    )
-
-
 def realsense_of(arguments: argparse.Namespace) -> RealSenseSettings:
     """Return the settings that the options describe."""
-    names = [field.name for field in fields(RealSenseSettings)]
-    return RealSenseSettings(**{name: getattr(arguments, name) for name in names})
+    return settings_of(RealSenseSettings, arguments)
 
 
 def gate_of(
@@ -248,25 +138,3 @@ def open_source(
             if (hololens2 := hololens2_settings(other)) is not None:
                 return open_hololens2(replace(hololens2, keeps_wrapped=keeps_wrapped))
             return open_live(other) if is_live(other) else open_recording(Path(other))
-
-
-def _replay_row(step: ReplayStep) -> dict[str, Any]:
-    import numpy as np
-
-    hand, motion = step.hand, step.motion
-    return {
-        "frame": step.frame.index,
-        "points": len(hand.points_m) if hand else None,
-        "median_depth_m": hand.median_depth_m if hand else None,
-        "turned_deg": float(np.degrees(np.linalg.norm(motion.rotation_rad))) if motion else None,
-        "moved_mm": float(1e3 * np.linalg.norm(motion.shift_m)) if motion else None,
-        "segment_ms": 1e3 * step.segment_s,
-        "color": step.frame.color is not None,
-        "problem": step.problem,
-    }
-
-
-def _cell(value: float | None) -> str:
-    if value is None:
-        return "–"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)

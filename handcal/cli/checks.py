@@ -36,7 +36,8 @@ if TYPE_CHECKING:
 )
 def bench(arguments: argparse.Namespace) -> None:
     """Measure accuracy and speed, and compare them with targets and a baseline."""
-    from handcal.lab.bench import PARTS, QUICK, BenchSettings, bench_table, run_bench
+    from handcal.lab.bench.run import PARTS, bench_table, run_bench
+    from handcal.lab.bench.trials import QUICK, BenchSettings
 
     if arguments.only not in ("", *PARTS):
         fail(f"unknown part {arguments.only!r}; choose from {', '.join(PARTS)}", 2)
@@ -80,9 +81,7 @@ def doctor(arguments: argparse.Namespace) -> None:
         findings += _headset_findings(arguments)
     for finding in findings:
         advice = f"\n         → {finding.advice}" if finding.advice else ""
-        console.print(
-            f"{finding.health.value:8} {finding.what}: {finding.found}{advice}", markup=False
-        )
+        console.print(f"{finding.health.value:8} {finding.what}: {finding.found}{advice}")
     if any(finding.health is Health.BROKEN for finding in findings):
         raise HandcalError("fix the problems listed above and try again")
 
@@ -105,9 +104,9 @@ def support(arguments: argparse.Namespace) -> None:
     settings = replace(settings, sessions=sessions, frames=arguments.frames)
     with show_progress() as progress:
         written = run_support(arguments.output, settings, progress)
-    console.print(f"{arguments.output}: {', '.join(written[:4])}", markup=False)
+    console.print(f"{arguments.output}: {', '.join(written[:4])}")
     if len(written) > 4:
-        console.print(f"and {len(written) - 4} more files", markup=False)
+        console.print(f"and {len(written) - 4} more files")
 
 
 def _headset_findings(arguments: argparse.Namespace) -> list[Finding]:

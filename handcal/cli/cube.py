@@ -7,11 +7,19 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.markup import escape
-
 from handcal.cli.boards import GRID_OPTION
 from handcal.cli.output import console, save, show_progress, table
-from handcal.cli.terminal import arg, command, file_option, flag, folder_option, number, seed, value
+from handcal.cli.terminal import (
+    arg,
+    command,
+    file_option,
+    flag,
+    folder_option,
+    number,
+    seed,
+    settings_of,
+    value,
+)
 from handcal.core.errors import CameraError, HandcalError
 from handcal.core.types import EYES
 from handcal.io.files import make_folder
@@ -78,11 +86,11 @@ def net(arguments: argparse.Namespace) -> None:
         write_cube_pdf(arguments.pdf, cube, arguments.paper)
     except ValueError as error:
         raise HandcalError(str(error)) from error
-    console.print(f"{arguments.pdf}: print at 100 %, and measure the ruler", markup=False)
+    console.print(f"{arguments.pdf}: print at 100 %, and measure the ruler")
     if arguments.cube is not None:
         make_folder(arguments.cube.parent)
         write_cube(arguments.cube, cube)
-        console.print(f"{arguments.cube}: enter the measured sides there", markup=False)
+        console.print(f"{arguments.cube}: enter the measured sides there")
 
 
 @command(
@@ -122,11 +130,11 @@ def capture(arguments: argparse.Namespace) -> None:
     from handcal.camera.viewpoint import open_viewpoint
     from handcal.lab.evaluate.cube_capture import take_at_rest, take_captures
     from handcal.lab.evaluate.cube_folder import missing_captures
-    from handcal.lab.evaluate.run import cube_and_grid
+    from handcal.lab.evaluate.cube_test import cube_and_grid
 
     def ask(what: str) -> None:
         try:
-            console.input(f"{escape(what)}, then press Enter ")
+            console.input(f"{what}, then press Enter ", markup=False)
         except EOFError:
             raise HandcalError("no answer", "repeat the command to take what is missing") from None
 
@@ -169,20 +177,12 @@ def capture(arguments: argparse.Namespace) -> None:
 )
 def simulate(arguments: argparse.Namespace) -> None:
     """Render all captures of a test, with a display calibrated by a simulated hand."""
-    from handcal.lab.evaluate.run import render_captures
+    from handcal.lab.evaluate.cube_test import render_captures
     from handcal.lab.settings import CubeTestSettings
 
-    settings = CubeTestSettings(
-        rig=_text(arguments.rig),
-        eye=arguments.eye,
-        seed=arguments.seed,
-        poses=arguments.poses,
-        alignments=arguments.alignments,
-        prior=arguments.prior,
-    )
     with show_progress() as progress:
-        render_captures(settings, arguments.folder, progress)
-    console.print(f"Captures: {arguments.folder}", markup=False)
+        render_captures(settings_of(CubeTestSettings, arguments), arguments.folder, progress)
+    console.print(f"Captures: {arguments.folder}")
 
 
 @command(
@@ -196,18 +196,18 @@ def simulate(arguments: argparse.Namespace) -> None:
 )
 def report(arguments: argparse.Namespace) -> None:
     """Report the errors of the drawn cube against the real one, over all captures."""
-    from handcal.lab.evaluate.run import run_cube_test
+    from handcal.lab.evaluate.cube_test import run_cube_test
     from handcal.report.cells import mean_sd
 
     settings = replace(
         _settings(arguments),
-        camera=_text(arguments.camera_intrinsics),
+        camera=str(arguments.camera_intrinsics or ""),
         output=str(arguments.output),
     )
     with show_progress() as progress:
         found = run_cube_test(settings, progress)
     for name, why in found.test.left_out.items():
-        console.print(f"Left out: {name}: {why}", markup=False)
+        console.print(f"Left out: {name}: {why}")
     errors = {
         drawn: {name: asdict(error) for name, error in by_name.items()}
         for drawn, by_name in found.summary.items()
@@ -217,27 +217,18 @@ def report(arguments: argparse.Namespace) -> None:
     shown_table = table("drawn", "pairs", *(title for _, title in _SHOWN))
     for drawn, by_name in found.summary.items():
         spreads = [by_name[name].spread for name, _ in _SHOWN]
-        shown_table.add_row(escape(drawn), str(spreads[0].count), *map(mean_sd, spreads))
+        shown_table.add_row(drawn, str(spreads[0].count), *map(mean_sd, spreads))
     console.print(shown_table)
     for file in found.files:
-        console.print(str(file), markup=False)
+        console.print(str(file))
 
 
 def _settings(arguments: argparse.Namespace) -> CubeTestSettings:
     """Return the settings that the options of captures describe."""
     from handcal.lab.settings import CubeTestSettings
 
-    return CubeTestSettings(
-        captures=str(arguments.folder),
-        cube=_text(arguments.cube),
-        rig=_text(arguments.rig),
-        eye=arguments.eye,
-        square_px=arguments.square_px,
-    )
-
-
-def _text(path: Path | None) -> str:
-    return "" if path is None else str(path)
+    # The captures' option --camera is a number, and that of the settings a file.
+    return settings_of(CubeTestSettings, arguments, captures=str(arguments.folder), camera="")
 
 
 def _only_camera() -> int:
@@ -246,5 +237,5 @@ def _only_camera() -> int:
     cameras = list_viewpoints()
     if len(cameras) != 1:
         there = f"cameras {', '.join(map(str, cameras))} are there" if cameras else "there is none"
-        raise CameraError("say which camera: --camera N", f"{there}")
+        raise CameraError(there, "say which camera: --camera N")
     return cameras[0]

@@ -11,9 +11,18 @@ from handcal.cli.cameras import REALSENSE_OPTIONS, open_source, realsense_of
 from handcal.cli.display_check import network_server
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
 from handcal.cli.run import KEYS, LISTEN
-from handcal.cli.terminal import arg, command, file_option, flag, number, patience, value
+from handcal.cli.terminal import (
+    arg,
+    command,
+    eyes_of,
+    eyes_option,
+    file_option,
+    flag,
+    number,
+    patience,
+    value,
+)
 from handcal.core.errors import HandcalError
-from handcal.core.types import EYES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -96,7 +105,7 @@ def track(arguments: argparse.Namespace) -> None:
         default="network",
         help="a paired headset that connects; or a simulated one, with the simulator's wearer",
     ),
-    arg("--eyes", choices=("both", *EYES), default="both", help="eyes to record trials for"),
+    eyes_option("eyes to record trials for"),
     *_CUBE,
     *REALSENSE_OPTIONS,
     json=True,
@@ -113,9 +122,7 @@ def trials(arguments: argparse.Namespace) -> None:
 
     if (arguments.headset == "virtual") != (arguments.camera == "simulator"):
         raise HandcalError("--headset virtual and --camera simulator go together")
-    settings = TrialSettings(
-        EYES if arguments.eyes == "both" else (arguments.eyes,), patience_s=arguments.patience_s
-    )
+    settings = TrialSettings(eyes_of(arguments), patience_s=arguments.patience_s)
     made = record_user_trials(
         TrialOrder(arguments.session, arguments.cube, settings),
         None if arguments.headset == "virtual" else lambda: network_server(arguments),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from handcal.cli.output import console
 from handcal.cli.run import KEYS, LISTEN, paired_headsets
-from handcal.cli.terminal import arg, command, file_option, patience
+from handcal.cli.terminal import arg, command, eyes_of, eyes_option, file_option, patience
 from handcal.core.errors import HandcalError
 from handcal.io.files import make_folder
 
@@ -37,12 +37,7 @@ _MODES = "obeys", "no-override", "one-for-both", "depth", "infinity", "image-pla
         metavar="SOURCE",
         help="number of the viewpoint camera (default: ask who looks through the display)",
     ),
-    arg(
-        "--eyes",
-        choices=("both", "left", "right"),
-        default="both",
-        help="the eyes to check",
-    ),
+    eyes_option("the eyes to check"),
     arg(
         "--mode",
         choices=_MODES,
@@ -55,13 +50,11 @@ _MODES = "obeys", "no-override", "one-for-both", "depth", "infinity", "image-pla
 )
 def display_check(arguments: argparse.Namespace) -> None:
     """Check that a connected headset draws what it is sent, and store the check in a rig file."""
-    from handcal.core.types import EYES
     from handcal.rig.report import display_finding
     from handcal.rig.rig_file import read_rig, write_rig
     from handcal.station.checks.display_check import run_display_check
 
     rig = read_rig(arguments.rig)
-    eyes = EYES if arguments.eyes == "both" else (arguments.eyes,)
     with ExitStack() as stack:
         if arguments.headset == "virtual":
             server, observe = stack.enter_context(_simulated(rig, arguments.mode))
@@ -70,13 +63,13 @@ def display_check(arguments: argparse.Namespace) -> None:
             observe = stack.enter_context(_observer(arguments.viewpoint))
         is_asked = arguments.headset == "network" and arguments.viewpoint is None
         made = run_display_check(
-            server, rig, observe, "wearer" if is_asked else "camera", eyes=eyes
+            server, rig, observe, "wearer" if is_asked else "camera", eyes=eyes_of(arguments)
         )
     finding = display_finding(made)
-    console.print(f"{'good' if finding.is_fine else 'bad'}: {finding.found}", markup=False)
+    console.print(f"{'good' if finding.is_fine else 'bad'}: {finding.found}")
     make_folder(arguments.output.parent)
     write_rig(arguments.output, replace(rig, display_check=made))
-    console.print(str(arguments.output), markup=False)
+    console.print(str(arguments.output))
     if not finding.is_fine:
         raise HandcalError("the headset does not draw what it is sent", "see above")
 

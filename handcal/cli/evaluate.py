@@ -7,10 +7,16 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import get_args
 
-from rich.markup import escape
-
 from handcal.cli.output import console, save, show_progress, table
-from handcal.cli.terminal import arg, command, file_option, folder_option, number, value
+from handcal.cli.terminal import (
+    arg,
+    command,
+    file_option,
+    folder_option,
+    number,
+    settings_of,
+    value,
+)
 from handcal.core.errors import HandcalError
 from handcal.hand.settings import Roi
 from handcal.io.files import make_folder, require_suffix
@@ -54,13 +60,17 @@ def detector(arguments: argparse.Namespace) -> None:
     from handcal.hand.detect import HandDetector
     from handcal.hand.shipped import load_detector
     from handcal.lab.evaluate.annotations import read_annotations
-    from handcal.lab.evaluate.conditions import Conditions
-    from handcal.lab.evaluate.contact_sheet import write_contact_sheet
-    from handcal.lab.evaluate.detector import EVALUATED, detect_all, evaluation
+    from handcal.lab.evaluate.detector import (
+        EVALUATED,
+        Conditions,
+        detect_all,
+        evaluation,
+        write_contact_sheet,
+    )
 
     images = arguments.images or arguments.folder
     if images is None or (arguments.images and arguments.folder):
-        raise HandcalError("no photographs to measure: give one folder, or --images")
+        raise HandcalError("no photographs to measure", "give one folder, or --images")
     conditions = Conditions(arguments.brightness, arguments.hand_height, arguments.glove)
     if arguments.sheet is not None:  # before the long work, whose result would be lost
         require_suffix(arguments.sheet, ".png")
@@ -83,8 +93,8 @@ def detector(arguments: argparse.Namespace) -> None:
     shares = table("skin", "side", "hands", "found, score at least 0.3", "95 % interval")
     for share in result["found"]:
         shares.add_row(
-            escape(share["skin"] or "all"),
-            escape(share["aspect"]),
+            share["skin"] or "all",
+            share["aspect"],
             str(share["hands"]),
             f"{100 * share['share']:.1f} %",
             f"{100 * share['low']:.1f} to {100 * share['high']:.1f} %",
@@ -110,47 +120,30 @@ def detector(arguments: argparse.Namespace) -> None:
 )
 def segmentation(arguments: argparse.Namespace) -> None:
     """Measure the segmentation of the hand on frames with true masks."""
-    from handcal.lab.evaluate.run import run_segmentation_test
+    from handcal.lab.evaluate.segmentation import cell, frame_table, run_segmentation_test
     from handcal.lab.settings import SegmentationTestSettings
 
-    settings = SegmentationTestSettings(
-        str(arguments.folder),
-        arguments.roi,
-        str(arguments.sheet or ""),
-        str(arguments.output or ""),
-    )
     with show_progress() as progress:
+        settings = settings_of(SegmentationTestSettings, arguments)
         result = run_segmentation_test(settings, progress).figures
     save(arguments.json, result)
-    shown_table = table(
-        "frame", "IoU", "kept, %", "beyond wrist, mm", "area ±, %", "centroid ±, mm"
-    )
-    for row in result["rows"]:
-        shown_table.add_row(
-            row["name"],
-            _cell(row["iou"], 1, 3),
-            _cell(row["kept"], 100, 1),
-            _cell(row["beyond_wrist_mm"], 1, 1),
-            _cell(row["area_change"], 100, 1),
-            _cell(row["centroid_change_mm"], 1, 1),
-        )
+    frames = frame_table(result["rows"])
+    shown_table = table(*(column.title for column in frames.columns))
+    for cells in frames.rows:
+        shown_table.add_row(*cells)
     console.print(shown_table)
     for row in result["rows"]:
         if row["refused"] is not None:
-            console.print(f"{row['name']}: {row['refused']}", markup=False)
+            console.print(f"{row['name']}: {row['refused']}")
     console.print(
         f"{result['frames']} frames, {result['refused']} refused. "
-        f"IoU {_cell(result['iou_mean'], 1, 3)}, at least {_cell(result['iou_min'], 1, 3)}; "
-        f"at least {_cell(result['kept_min'], 100, 1)} % of the hand kept. Cut at the wrist: "
-        f"SD {_cell(result['wrist_sd_mm'], 1, 1)} mm, largest step "
-        f"{_cell(result['wrist_max_step_mm'], 1, 1)} mm. Area of cropped, scaled and sub-sampled "
-        f"frames: at most {_cell(result['area_change_max'], 100, 1)} % different; more than 10 % "
+        f"IoU {cell(result['iou_mean'], 1, 3)}, at least {cell(result['iou_min'], 1, 3)}; "
+        f"at least {cell(result['kept_min'], 100, 1)} % of the hand kept. Cut at the wrist: "
+        f"SD {cell(result['wrist_sd_mm'], 1, 1)} mm, largest step "
+        f"{cell(result['wrist_max_step_mm'], 1, 1)} mm. Area of cropped, scaled and sub-sampled "
+        f"frames: at most {cell(result['area_change_max'], 100, 1)} % different; more than 10 % "
         f"in {result['area_changes_over_10_percent']} frames."
     )
-
-
-def _cell(value: float | None, scale: float, digits: int) -> str:
-    return "–" if value is None else f"{scale * value:.{digits}f}"
 
 
 @command(
@@ -160,7 +153,7 @@ def _cell(value: float | None, scale: float, digits: int) -> str:
 )
 def users(arguments: argparse.Namespace) -> None:
     """Evaluate the user test: the errors that wearers saw after calibration."""
-    from handcal.lab.evaluate.run import run_user_test
+    from handcal.lab.evaluate.user_test import run_user_test
     from handcal.lab.settings import UserTestSettings
     from handcal.report.cells import interval_ends, mean_sd
 
@@ -172,7 +165,7 @@ def users(arguments: argparse.Namespace) -> None:
     shown_table = table("wearer", "calibrations", "trials", "mean ± SD, arcmin", "95 % interval")
     for name, errors in (*result.by_wearer.items(), ("all", result.total)):
         shown_table.add_row(
-            escape(name),
+            name,
             str(errors.calibrations),
             str(errors.trials),
             mean_sd(errors.arcmin),
@@ -180,7 +173,7 @@ def users(arguments: argparse.Namespace) -> None:
         )
     console.print(shown_table)
     for path, why in result.left_out.items():
-        console.print(f"Left out: {path}: {why}", markup=False)
+        console.print(f"Left out: {path}: {why}")
     console.print(found.report.lead)
     for file in found.files:
-        console.print(str(file), markup=False)
+        console.print(str(file))

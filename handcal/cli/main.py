@@ -10,190 +10,105 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from importlib import import_module
+from importlib.abc import InspectLoader
+from importlib.util import find_spec
 from io import TextIOWrapper
+from types import CodeType
 from typing import NamedTuple
 
 from handcal.cli.terminal import Command, Parser, errors_in_one_line, require_writable
 
 
-class Entry(NamedTuple):
-    """A command or a group of commands, as ``--help`` lists it."""
+class Group(NamedTuple):
+    """Commands with a common first word."""
 
     purpose: str
-    """The docstring of the command's function."""
-    home: str | Mapping[str, Entry]
-    """The module of the function, or the commands of the group."""
+    commands: Mapping[str, str | Group]
+    """As `COMMANDS`."""
 
 
-_CUBE: Mapping[str, Entry] = {
-    "track": Entry(
-        "Track a cube with the depth camera, and have the headset draw it where it is.",
-        "cube_live",
+COMMANDS: Mapping[str, str | Group] = {
+    "demo": "simulate",
+    "run": "run",
+    "headset": "simulate",
+    "pair": "pairing",
+    "devices": "pairing",
+    "record": "cameras",
+    "replay": "recordings",
+    "segment": "recordings",
+    "solve": "sessions",
+    "prior": "sessions",
+    "export": "sessions",
+    "openxr": Group(
+        "Give the calibrated eyes to every OpenXR program of this user.",
+        {
+            "install": "openxr",
+            "use": "openxr",
+            "status": "openxr",
+            "remove": "openxr",
+        },
     ),
-    "net": Entry(
-        "Make a cube: its net to print at true size, and the file that describes it.", "cube"
+    "session": Group(
+        "Check and repair stored sessions.",
+        {
+            "check": "sessions",
+            "repair": "sessions",
+        },
     ),
-    "capture": Entry(
-        "Capture the real and the drawn cube with a camera, guided step by step.", "cube"
+    "inspect": "sessions",
+    "rig": Group(
+        "Calibrate the rig offline: boards, cameras, displays, and the rig file.",
+        {
+            "board": "rig",
+            "take": "rig",
+            "camera": "rig",
+            "stereo": "rig",
+            "convert": "rig",
+            "grid": "rig_files",
+            "gray": "rig_files",
+            "display": "rig_files",
+            "make": "rig_files",
+            "depth": "rig_files",
+            "display-check": "display_check",
+            "check": "rig_files",
+            "compare": "rig_files",
+            "accept": "accept",
+            "simulate": "accept",
+        },
     ),
-    "simulate": Entry(
-        "Render all captures of a test, with a display calibrated by a simulated hand.", "cube"
+    "evaluate": Group(
+        "Evaluate handcal on given images and sessions.",
+        {
+            "cube": Group(
+                "Camera-based test: the error between a drawn cube and the real one.",
+                {
+                    "track": "cube_live",
+                    "net": "cube",
+                    "capture": "cube",
+                    "simulate": "cube",
+                    "report": "cube",
+                },
+            ),
+            "detector": "evaluate",
+            "segmentation": "evaluate",
+            "trials": "cube_live",
+            "users": "evaluate",
+        },
     ),
-    "report": Entry(
-        "Report the errors of the drawn cube against the real one, over all captures.", "cube"
+    "study": Group(
+        "Run a study on simulated wearers, in many processes, with a report.",
+        {
+            "noise": "study",
+            "methods": "study",
+            "procedures": "study",
+            "recorded": "study",
+        },
     ),
+    "bench": "checks",
+    "doctor": "checks",
+    "support": "checks",
 }
-
-_EVALUATE: Mapping[str, Entry] = {
-    "cube": Entry("Camera-based test: the error between a drawn cube and the real one.", _CUBE),
-    "detector": Entry(
-        "Measure the hand detector's precision on annotated photographs.", "evaluate"
-    ),
-    "segmentation": Entry(
-        "Measure the segmentation of the hand on frames with true masks.", "evaluate"
-    ),
-    "trials": Entry(
-        "Record the user test's trials with a cube in the room, for a calibrated session.",
-        "cube_live",
-    ),
-    "users": Entry(
-        "Evaluate the user test: the errors that wearers saw after calibration.",
-        "evaluate",
-    ),
-}
-
-_STUDY: Mapping[str, Entry] = {
-    "noise": Entry(
-        "Repeat the paper's simulation, and add disturbances that it left out.", "study"
-    ),
-    "methods": Entry("Compare calibration methods on the same simulated wearers.", "study"),
-    "procedures": Entry("Compare calibration procedures on the same simulated wearers.", "study"),
-    "recorded": Entry(
-        "Run SPAAM and INDICA on the public recordings of Itoh and Klinker.", "study"
-    ),
-}
-
-_RIG: Mapping[str, Entry] = {
-    "board": Entry("Make a calibration board: a PDF at true size, or a PNG for a screen.", "rig"),
-    "take": Entry(
-        "Capture images of a board, or of a display's grid, from a camera, recording or video.",
-        "rig",
-    ),
-    "camera": Entry("Calibrate a camera's intrinsics from images of a board.", "rig"),
-    "stereo": Entry(
-        "Calibrate the depth camera's pose on the headset from image pairs of one board.", "rig"
-    ),
-    "convert": Entry(
-        "Convert intrinsics or a stereo pose between the files of OpenCV, ROS and handcal.", "rig"
-    ),
-    "grid": Entry(
-        "Make the grid that a display shows to the viewpoint camera, pixel for pixel.",
-        "rig_displays",
-    ),
-    "gray": Entry(
-        "Make the Gray-code patterns that a display shows one after the other, in place of a grid.",
-        "rig_displays",
-    ),
-    "display": Entry(
-        "Calibrate one eye's display from the viewpoint camera's images of its grid.",
-        "rig_displays",
-    ),
-    "make": Entry(
-        "Write the depth camera's pose, from stereo calibration or the factory, into a rig file.",
-        "rig_files",
-    ),
-    "depth": Entry(
-        "Check depth and edges of the depth camera by a board, and store them in a rig file.",
-        "rig_files",
-    ),
-    "display-check": Entry(
-        "Check that a connected headset draws what it is sent, and store the check in a rig file.",
-        "display_check",
-    ),
-    "check": Entry(
-        "Check a rig file: every field, its plausibility, and how it was calibrated.", "rig_files"
-    ),
-    "compare": Entry(
-        "Compare two rig files, and show how far apart they draw a target.", "rig_files"
-    ),
-    "accept": Entry(
-        "Check a rig without a wearer, with a camera in the eye's place; exit code 1 if it fails.",
-        "accept",
-    ),
-    "simulate": Entry(
-        "Render the images of an offline calibration and of an acceptance, to practise with.",
-        "accept",
-    ),
-}
-
-_SESSION: Mapping[str, Entry] = {
-    "check": Entry(
-        "Check all of a session, and solve it; exit code 1 if any is bad, 2 if it is none.",
-        "sessions",
-    ),
-    "repair": Entry("Copy the sound parts of a damaged session into a new one.", "sessions"),
-}
-
-_OPENXR: Mapping[str, Entry] = {
-    "install": Entry(
-        "Have every OpenXR program of this user render with the calibration in force.", "openxr"
-    ),
-    "use": Entry("Put a session's final calibration in force for OpenXR programs.", "openxr"),
-    "status": Entry(
-        "Show whether the layer is installed, whose calibration is in force, and what it last did.",
-        "openxr",
-    ),
-    "remove": Entry("Remove the layer and end the calibration in force.", "openxr"),
-}
-
-COMMANDS: Mapping[str, Entry] = {
-    "demo": Entry(
-        "Calibrate a simulated wearer from start to end, and compare with the truth.", "simulate"
-    ),
-    "run": Entry(
-        "Calibrate one wearer without a window, for scripts and for testing headset apps.", "run"
-    ),
-    "headset": Entry(
-        "Run a virtual headset with a simulated wearer, connected by the real protocol.", "simulate"
-    ),
-    "pair": Entry(
-        "Pair a headset: show a QR code and a short code, and wait for the headset.", "pairing"
-    ),
-    "devices": Entry("List the paired headsets; rename or revoke one, by its identity.", "pairing"),
-    "record": Entry("Record a camera into a .db3 file or a folder of images.", "cameras"),
-    "replay": Entry("Play a recording and segment the hand in every frame.", "cameras"),
-    "segment": Entry(
-        "Segment the hand in one image pair: cloud, contour, mask and overlay.", "cameras"
-    ),
-    "solve": Entry("Solve a stored session again; the session itself is not changed.", "sessions"),
-    "prior": Entry(
-        "Show what finished sessions with one rig tell of eyes, and of what wearers see wrongly.",
-        "sessions",
-    ),
-    "export": Entry(
-        "Export sessions: report, tables, calibration, clouds, and the session as one file.",
-        "sessions",
-    ),
-    "openxr": Entry("Give the calibrated eyes to every OpenXR program of this user.", _OPENXR),
-    "session": Entry("Check and repair stored sessions.", _SESSION),
-    "inspect": Entry(
-        "Show a session's clouds, residuals, eyes and displays in a 3D window.", "sessions"
-    ),
-    "rig": Entry("Calibrate the rig offline: boards, cameras, displays, and the rig file.", _RIG),
-    "evaluate": Entry("Evaluate handcal on given images and sessions.", _EVALUATE),
-    "study": Entry("Run a study on simulated wearers, in many processes, with a report.", _STUDY),
-    "bench": Entry(
-        "Measure accuracy and speed, and compare them with targets and a baseline.", "checks"
-    ),
-    "doctor": Entry(
-        "Check the installation, the camera and the headset, with advice for each problem.",
-        "checks",
-    ),
-    "support": Entry(
-        "Write one file for a bug report: doctor, versions, log without names, frames if wanted.",
-        "checks",
-    ),
-}
+"""The module of `handcal.cli` that holds a command's function, by the command's name."""
 
 
 def main() -> None:
@@ -232,23 +147,40 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
 
 def load(name: str, module: str) -> Command:
     """Import a command from a module of `handcal.cli`."""
-    found: Command = getattr(import_module(f"handcal.cli.{module}"), name.replace("-", "_"))
-    return found
+    loaded: Command = getattr(import_module(f"handcal.cli.{module}"), name.replace("-", "_"))
+    return loaded
 
 
-def _add(parser: Parser, entries: Mapping[str, Entry], words: Sequence[str]) -> None:
+def purpose(name: str, module: str) -> str:
+    """Return the docstring of a command's function.
+
+    It is read from the compiled module: importing all commands takes seconds, and ``--help`` must
+    not.
+    """
+    spec = find_spec(f"handcal.cli.{module}")
+    assert spec is not None
+    assert isinstance(spec.loader, InspectLoader)
+    code = spec.loader.get_code(spec.name)
+    assert code is not None
+    functions = (part for part in code.co_consts if isinstance(part, CodeType))
+    function = next(part for part in functions if part.co_name == name.replace("-", "_"))
+    return str(function.co_consts[0])  # Python's place for a docstring
+
+
+def _add(parser: Parser, entries: Mapping[str, str | Group], words: Sequence[str]) -> None:
     """Add commands to a parser; only the command that begins `words` gets its options."""
     commands = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
     # No option before a command takes a value.
     place = next((i for i, word in enumerate(words) if not word.startswith("-")), len(words))
     for name, entry in entries.items():
-        made = commands.add_parser(name, help=entry.purpose, description=entry.purpose)
+        text = entry.purpose if isinstance(entry, Group) else purpose(name, entry)
+        subparser = commands.add_parser(name, help=text, description=text)
         if [name] != list(words[place : place + 1]):
             continue
-        if isinstance(entry.home, str):
-            load(name, entry.home).add_to(made)
+        if isinstance(entry, Group):
+            _add(subparser, entry.commands, words[place + 1 :])
         else:
-            _add(made, entry.home, words[place + 1 :])
+            load(name, entry).add_to(subparser)
 
 
 class _Version(argparse.Action):

@@ -20,8 +20,7 @@ def install(_: argparse.Namespace) -> None:
         f"Installed ({manifest}): every OpenXR program that you start from now on loads handcal's "
         "layer, which gives it the calibrated eyes and the runtime its own views.\n"
         f"{OFF}=1 in a program's environment keeps the layer out of it; handcal openxr remove ends "
-        "it for all.\nCalibrate now; then put the calibration in force: handcal openxr use SESSION",
-        markup=False,
+        "it for all.\nCalibrate now; then put the calibration in force: handcal openxr use SESSION"
     )
 
 
@@ -44,7 +43,7 @@ def use(arguments: argparse.Namespace) -> None:
 
     use_calibration(Session.open(arguments.session), keep=arguments.keep)
     for line in layer_status().lines[:2]:
-        console.print(line, markup=False)
+        console.print(line)
 
 
 @command(json=True)
@@ -55,4 +54,4 @@ def status(arguments: argparse.Namespace) -> None:
     found = layer_status()
     save(arguments.json, asdict(found))
     for line in found.lines:
-        console.print(line, markup=False)
+        console.print(line)

@@ -18,7 +18,8 @@ from rich.table import Table
 from handcal.core.progress import Progress
 from handcal.io.files import make_folder, write_json
 
-console = Console(soft_wrap=True, highlight=False)
+# Names and paths may hold brackets and colons: they are printed as they are.
+console = Console(soft_wrap=True, highlight=False, markup=False, emoji=False)
 
 
 def table(*columns: str) -> Table:
@@ -51,7 +52,7 @@ def show_progress(is_cancelled: Callable[[], bool] = lambda: False) -> Iterator[
             nonlocal last
             if last != (what, int(10 * share)):
                 last = what, int(10 * share)
-                console.print(f"{100 * share:3.0f} % {what}", markup=False)
+                console.print(f"{100 * share:3.0f} % {what}")
 
         yield Progress(say, is_cancelled)
         return

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 
-from rich.markup import escape
-
 from handcal.cli.output import console, show_progress, table, until_interrupted
 from handcal.cli.run import LISTEN
 from handcal.cli.terminal import arg, command, fail, file_option, number, value
@@ -26,20 +24,19 @@ def pair(arguments: argparse.Namespace) -> None:
 
     def show(invitation: Invitation) -> None:
         for line in qr_lines(invitation.text):
-            console.print(line, style="black on white", markup=False)
+            console.print(line, style="black on white")
         digits = invitation.digits
         console.print(
             f"Scan this code with the headset, or type {invitation.text}\n"
             f"or let the headset find this computer ({invitation.host}, port {invitation.port}) "
-            f"and type {digits[:4]} {digits[4:]}",
-            markup=False,
+            f"and type {digits[:4]} {digits[4:]}"
         )
 
     pairings = Pairings.read(arguments.keys or pairing_file())
     with until_interrupted() as is_stopped, show_progress(is_stopped) as progress:
         bind = (arguments.host, arguments.port)
         paired = run_pairing(bind, pairings, show, progress, 60.0 * arguments.minutes)
-    console.print(f"Paired: {paired.name or 'a headset'} ({paired.device_id})", markup=False)
+    console.print(f"Paired: {paired.name or 'a headset'} ({paired.device_id})")
 
 
 @command(
@@ -65,5 +62,5 @@ def devices(arguments: argparse.Namespace) -> None:
         return
     listed = table("device", "name")
     for one in shown:
-        listed.add_row(one.device_id, escape(one.name))
+        listed.add_row(one.device_id, one.name)
     console.print(listed)

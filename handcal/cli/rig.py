@@ -77,13 +77,13 @@ def board(arguments: argparse.Namespace) -> None:
         if arguments.pdf:
             make_folder(arguments.pdf.parent)
             write_board_pdf(arguments.pdf, made, arguments.paper)
-            console.print(f"{arguments.pdf}: print at 100 %, and measure the ruler", markup=False)
+            console.print(f"{arguments.pdf}: print at 100 %, and measure the ruler")
         if arguments.png:
             image = draw_board(made, arguments.square_px)
             make_folder(arguments.png.parent)
             write_png(arguments.png, image)
             size = f"{image.shape[1]}x{image.shape[0]}"
-            console.print(f"{arguments.png}: {size} pixels", markup=False)
+            console.print(f"{arguments.png}: {size} pixels")
     except ValueError as error:
         raise HandcalError(str(error)) from error
 
@@ -146,7 +146,7 @@ def take(arguments: argparse.Namespace) -> None:
             for source, into in zip(sources, folders, strict=True)
         ]
         names = " and ".join(one.name for one in cameras)
-        console.print(f"Capturing from {names}; press Ctrl+C to stop", markup=False)
+        console.print(f"Capturing from {names}; press Ctrl+C to stop")
         is_stopped = stack.enter_context(until_interrupted())
         progress = stack.enter_context(show_progress(is_stopped))
         settings = TakeSettings(seconds=arguments.seconds, choose=choose)
@@ -155,7 +155,7 @@ def take(arguments: argparse.Namespace) -> None:
         console.print(f"{count} of {taken.looked_at} moments skipped: {why}")
     if not taken.kept:
         raise HandcalError("no image was kept", "see the reasons above")
-    console.print(f"{taken.kept} kept in {' and '.join(map(str, folders))}", markup=False)
+    console.print(f"{taken.kept} kept in {' and '.join(map(str, folders))}")
 
 
 @command(
@@ -286,14 +286,11 @@ def convert(arguments: argparse.Namespace) -> None:
             write_intrinsics(output, read_camera(source, arguments.camera, arguments.size), kind)
     except ValueError as error:
         raise HandcalError(str(error)) from error
-    console.print(str(output), markup=False)
+    console.print(str(output))
 
 
 def _conclude(rms_px: float, worst: WorstView, verdict: CalibrationVerdict) -> None:
-    console.print(
-        f"RMS {rms_px:.3f} px. Worst: {worst.name}, {worst.rms_px:.2f} px: {worst.why}",
-        markup=False,
-    )
+    console.print(f"RMS {rms_px:.3f} px. Worst: {worst.name}, {worst.rms_px:.2f} px: {worst.why}")
     show_verdict(verdict)
 
 
@@ -311,4 +308,4 @@ def _write(
             in_another(arguments.output)
         except ValueError as error:
             raise HandcalError(str(error)) from error
-    console.print(str(arguments.output), markup=False)
+    console.print(str(arguments.output))

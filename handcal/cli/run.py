@@ -160,11 +160,11 @@ def run(arguments: argparse.Namespace) -> None:
         shown_table.add_row(eye, shift, sigma, VERDICT_WORDS[found["verdict"]], is_applied)
     console.print(shown_table)
     for eye, found in result["eyes"].items():
-        console.print(f"{eye}: {VERDICT_WORDS[found['verdict']]}: {found['reason']}", markup=False)
+        console.print(f"{eye}: {VERDICT_WORDS[found['verdict']]}: {found['reason']}")
     if lost := result["link"]["given_up"]:
         listed = ", ".join(f"{name.replace('_', ' ')} {count}×" for name, count in lost.items())
-        console.print(f"The headset never acknowledged: {listed}", markup=False)
-    console.print(f"Session: {result['session']}", markup=False)
+        console.print(f"The headset never acknowledged: {listed}")
+    console.print(f"Session: {result['session']}")
     if any(found["verdict"] == "contradicted" for found in result["eyes"].values()):
         sys.exit(_CONTRADICTED)
 
@@ -182,7 +182,7 @@ def bridges_of(arguments: argparse.Namespace) -> BridgeSettings:
 
 
 def _tell(line: str) -> None:
-    console.print(line, markup=False)
+    console.print(line)
 
 
 def paired_headsets(path: Path | None) -> Pairings:

@@ -124,8 +124,8 @@ def export(arguments: argparse.Namespace) -> None:
         with show_progress() as progress:
             made = export_sessions(arguments.session, folder, settings, progress)
         for file in made.files:
-            console.print(str(file), markup=False)
-        console.print(made.sentence, markup=False)
+            console.print(str(file))
+        console.print(made.sentence)
         if made.missing:
             fail(f"not exported: {', '.join(made.missing)}", 1)
         return
@@ -138,7 +138,7 @@ def export(arguments: argparse.Namespace) -> None:
         console.print(str(file))
     if arguments.into:
         kept = replace_configuration(arguments.into, folder / "northstar.json")
-        console.print(f"{arguments.into}, as it was in {kept}", markup=False)
+        console.print(f"{arguments.into}, as it was in {kept}")
 
 
 @command(arg("session", type=Path, help="session folder"), json=True)
@@ -150,7 +150,7 @@ def check(arguments: argparse.Namespace) -> None:
     save(arguments.json, asdict(found))
     for damage in found.damaged:
         # The message that it is not a session names its folder itself.
-        console.print(damage.what if found.state == "none" else str(damage), markup=False)
+        console.print(damage.what if found.state == "none" else str(damage))
     if found.state == "sound":
         console.print("The session is sound.")
     elif found.state == "damaged":
@@ -170,16 +170,14 @@ def repair(arguments: argparse.Namespace) -> None:
 
     rig = read_rig(arguments.rig) if arguments.rig else None
     made = repair_session(arguments.session, arguments.output, rig)
-    console.print(
-        f"{made.path}: {len(made.alignments)} alignments, {len(made.trials)} trials", markup=False
-    )
+    console.print(f"{made.path}: {len(made.alignments)} alignments, {len(made.trials)} trials")
 
 
 def _say_what_is_left_out(record: SessionRecord) -> None:
     if record.torn_bytes:
         console.print("The journal's last line is incomplete, as after a crash, and was ignored.")
     if record.left_out:
-        console.print(f"Left out: {record.left_out}.", markup=False)
+        console.print(f"Left out: {record.left_out}.")
 
 
 @command(

@@ -19,6 +19,7 @@ from handcal.cli.terminal import (
     folder_option,
     number,
     seed,
+    settings_of,
     value,
 )
 from handcal.core.types import Eye, VerdictName
@@ -48,7 +49,10 @@ _SHARE = number(float, 0.0, 1.0)
 _PORT = number(int, 1, 65535)
 _RIG = file_option("--rig", "rig file (default: the shipped example)")
 _HAND = arg(
-    "--hand", choices=("left", "right"), help="the raised hand (default: drawn from the seed)"
+    "--hand",
+    dest="side",
+    choices=("left", "right"),
+    help="the raised hand (default: drawn from the seed)",
 )
 _LINK = (
     value("--loss", _SHARE, "P", "share of datagrams lost", default=0.0),
@@ -69,7 +73,12 @@ _LINK = (
         help="the paper's alignments, or the recommended plan: cursors placed by the program, then "
         "a verification of each eye",
     ),
-    flag("--no-verify", "end the recommended plan without verifying the eyes"),
+    arg(
+        "--no-verify",
+        dest="verify",
+        action="store_false",
+        help="end the recommended plan without verifying the eyes",
+    ),
     arg(
         "--from",
         dest="former",
@@ -83,7 +92,11 @@ _LINK = (
     _RIG,
     file_option("--worn-rig", "true rig of the simulated headset (default: the same as --rig)"),
     *SENSOR_OPTIONS,
-    flag("--known-fat", "the rig knows how fat the camera's edges are, as from a depth check"),
+    flag(
+        "--known-fat",
+        "the rig knows how fat the camera's edges are, as from a depth check",
+        dest="is_fat_known",
+    ),
     arg(
         "--fault",
         choices=FAULTS,
@@ -103,24 +116,7 @@ def demo(arguments: argparse.Namespace) -> None:
     from handcal.core.types import EyeDistance
     from handcal.lab.demo import DemoSettings, run_demo
 
-    settings = DemoSettings(
-        seed=arguments.seed,
-        alignments=arguments.alignments,
-        eyes=arguments.eyes,
-        plan=arguments.plan,
-        verify=not arguments.no_verify,
-        former=str(arguments.former or ""),
-        slipped=arguments.slipped,
-        side=arguments.hand,
-        loss=arguments.loss,
-        reorder=arguments.reorder,
-        worn_rig=str(arguments.worn_rig or ""),
-        fault=arguments.fault or "",
-        eye_distance=arguments.eye_distance,
-        sensor=arguments.sensor,
-        fatten_px=arguments.fatten_px,
-        is_fat_known=arguments.known_fat,
-    )
+    settings = settings_of(DemoSettings, arguments)
     with until_interrupted() as is_stopped, show_progress(is_stopped) as progress:
         rig = _rig_path(arguments.rig)
         result = run_demo(settings, rig, make_folder(arguments.output), progress)
@@ -160,7 +156,7 @@ def demo(arguments: argparse.Namespace) -> None:
 def _say_contradictions(result: dict[str, Any], settings: DemoSettings) -> None:
     """Say why there is no result, and end."""
     for reason in dict.fromkeys(found["reason"] for found in result["eyes"].values()):
-        console.print(f"contradicted: {reason}", markup=False)
+        console.print(f"contradicted: {reason}")
     _say_meaning(result, settings)
     sys.exit(_CONTRADICTED)
 
@@ -169,8 +165,8 @@ def _say_meaning(result: dict[str, Any], settings: DemoSettings) -> None:
     """Say what each verdict means and what to try next, and the session's folder."""
     verdicts = {eye: found["verdict"] for eye, found in result["eyes"].items()}
     for line in meanings(verdicts, settings, result["session"]):
-        console.print(line, markup=False)
-    console.print(f"Session: {result['session']}", markup=False)
+        console.print(line)
+    console.print(f"Session: {result['session']}")
 
 
 def meanings(
@@ -257,9 +253,11 @@ def _next_step(verdict: VerdictName, settings: DemoSettings, session: str) -> st
         "S",
         "stop after this time (default: run until terminated)",
     ),
-    flag("--lose-start", "fault: the first projections never arrive"),
-    flag("--step-clock", "fault: after four seconds its clock is set by 0.3 s"),
-    flag("--stale", "fault: keep drawing with the projections of the wearer before"),
+    flag("--lose-start", "fault: the first projections never arrive", dest="loses_start"),
+    flag("--step-clock", "fault: after four seconds its clock is set by 0.3 s", dest="steps_clock"),
+    flag(
+        "--stale", "fault: keep drawing with the projections of the wearer before", dest="is_stale"
+    ),
     value(
         "--eye-distance-mm",
         number(float, 45.0, 85.0),
@@ -304,28 +302,17 @@ def headset(arguments: argparse.Namespace) -> None:
     else:
         fail("give --port and a pairing key, or --pair", 2)
     x_mm, y_mm, z_mm = arguments.slip_mm
-    settings = HeadsetSettings(
+    settings = settings_of(
+        HeadsetSettings,
+        arguments,
         rig_path=str(_rig_path(arguments.rig)),
         worn_rig_path=str(arguments.worn_rig or ""),
         host=host,
         port=port,
         device_id=device_id,
-        scene_port=arguments.scene_port,
-        seed=arguments.seed,
-        impairment=Impairment(
-            loss=arguments.loss,
-            duplicate=arguments.duplicate,
-            reorder=arguments.reorder,
-            delay_s=arguments.delay_ms / 1e3,
-            seed=arguments.seed,
-        ),
+        impairment=settings_of(Impairment, arguments, delay_s=arguments.delay_ms / 1e3),
         clock_offset_s=arguments.clock_offset_ms / 1e3,
-        duration_s=arguments.duration_s,
-        is_stale=arguments.stale,
-        loses_start=arguments.lose_start,
-        steps_clock=arguments.step_clock,
         eye_distance_m=arguments.eye_distance_mm and arguments.eye_distance_mm / 1e3,
-        side=arguments.hand,
         wearer=WearerSettings(slip_m=(x_mm / 1e3, y_mm / 1e3, z_mm / 1e3)),
         has_wearer=not arguments.as_device,
     )

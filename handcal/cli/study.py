@@ -19,6 +19,7 @@ from handcal.cli.terminal import (
     folder_option,
     number,
     seed,
+    settings_of,
     value,
 )
 
@@ -35,6 +36,7 @@ _STUDY_OPTIONS: dict[str, Option] = {
         number(int, 1, 1024),
         "N",
         "number of processes, at most one per core (default)",
+        dest="processes",
     ),
     "--scheduler": arg(
         "--scheduler",
@@ -42,7 +44,13 @@ _STUDY_OPTIONS: dict[str, Option] = {
         help="Dask cluster to run on, such as tcp://HOST:PORT (default: this computer)",
     ),
     "--seed": seed("the whole study"),
-    "--quick": flag("--quick", "few trials: do not report the figures"),
+    "--quick": arg(
+        "--quick",
+        dest="size",
+        action="store_const",
+        const="quick",
+        help="few trials: do not report the figures",
+    ),
 }
 
 
@@ -67,14 +75,7 @@ def noise(arguments: argparse.Namespace) -> None:
     from handcal.lab.settings import NoiseStudySettings
     from handcal.lab.study.studies import run_noise_study
 
-    settings = NoiseStudySettings(
-        size="quick" if arguments.quick else "full",
-        seed=arguments.seed,
-        processes=arguments.workers or 0,
-        scheduler=arguments.scheduler or "",
-        output=str(arguments.output),
-        open3d=arguments.open3d,
-    )
+    settings = settings_of(NoiseStudySettings, arguments)
     _run(arguments, partial(run_noise_study, settings))
 
 
@@ -90,6 +91,7 @@ def noise(arguments: argparse.Namespace) -> None:
         number(int, 2, 1000),
         "N",
         "first find the noise at which the paper's method has its published error, with N wearers",
+        dest="noise_wearers",
     ),
     *_study_options("methods"),
     json=True,
@@ -100,15 +102,11 @@ def methods(arguments: argparse.Namespace) -> None:
     from handcal.lab.study.methods import QUICK_METHODS, MethodSettings
     from handcal.lab.study.studies import run_method_comparison
 
-    usual = QUICK_METHODS if arguments.quick else MethodSettings()
-    settings = MethodComparisonSettings(
+    usual = QUICK_METHODS if arguments.size == "quick" else MethodSettings()
+    settings = settings_of(
+        MethodComparisonSettings,
+        arguments,
         wearers=usual.wearers if arguments.wearers is None else arguments.wearers,
-        seed=arguments.seed,
-        processes=arguments.workers or 0,
-        scheduler=arguments.scheduler or "",
-        output=str(arguments.output),
-        size="quick" if arguments.quick else "full",
-        noise_wearers=arguments.fit_noise or 0,
     )
     result = _run(arguments, partial(run_method_comparison, settings))
     for name, noise in (("method", result.noise), ("best iterate", result.best_noise)):
@@ -129,6 +127,7 @@ def methods(arguments: argparse.Namespace) -> None:
     ),
     arg(
         "--plan",
+        dest="plans",
         nargs="+",
         metavar="NAME",
         default=("paper", "recommended"),
@@ -136,6 +135,7 @@ def methods(arguments: argparse.Namespace) -> None:
     ),
     arg(
         "--variant",
+        dest="variants",
         nargs="+",
         metavar="NAME",
         default=("plain",),
@@ -145,6 +145,7 @@ def methods(arguments: argparse.Namespace) -> None:
     ),
     arg(
         "--scale",
+        dest="scales",
         nargs="+",
         type=number(float, 0.0, 10.0),
         metavar="F",
@@ -182,21 +183,7 @@ def procedures(arguments: argparse.Namespace) -> None:
     from handcal.lab.settings import ProcedureStudySettings
     from handcal.lab.study.studies import run_procedure_study
 
-    settings = ProcedureStudySettings(
-        wearers=arguments.wearers,
-        seed=arguments.seed,
-        plans=tuple(arguments.plan),
-        variants=tuple(arguments.variant),
-        scales=tuple(arguments.scale),
-        eye_distance=arguments.eye_distance,
-        prior=arguments.prior,
-        wearer_prior=arguments.wearer_prior,
-        sensor=arguments.sensor,
-        fatten_px=arguments.fatten_px,
-        processes=arguments.workers or 0,
-        scheduler=arguments.scheduler or "",
-        output=str(arguments.output or ""),
-    )
+    settings = settings_of(ProcedureStudySettings, arguments)
     rows = _unless_interrupted(partial(run_procedure_study, settings))
     save(arguments.json, {"rows": [asdict(row) for row in rows]})
     shown = table(
@@ -252,7 +239,7 @@ def _run(arguments: argparse.Namespace, order: Callable[[Progress], StudyResult]
     save(arguments.json, {"figures": figures})
     console.print(result.report.lead)
     for file in result.files:
-        console.print(str(file), markup=False)
+        console.print(str(file))
     return result
 
 

@@ -12,12 +12,16 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, TypeAlias, TypeVar
 
 from handcal.core.errors import CancelledError, HandcalError
 
 if TYPE_CHECKING:
-    from _typeshed import SupportsWrite
+    from _typeshed import DataclassInstance, SupportsWrite
+
+    from handcal.core.types import Eye
+
+Settings = TypeVar("Settings", bound="DataclassInstance")
 
 Run: TypeAlias = Callable[[argparse.Namespace], None]
 Option: TypeAlias = "Callable[[argparse._ActionsContainer], object]"
@@ -60,9 +64,9 @@ def folder_option(name: str, purpose: str, **settings: Any) -> Option:
     return arg(name, type=Path, metavar="FOLDER", help=purpose, **settings)
 
 
-def flag(name: str, purpose: str) -> Option:
-    """Return an option that is either given or not."""
-    return arg(name, action="store_true", help=purpose)
+def flag(name: str, purpose: str, **settings: Any) -> Option:
+    """Return an option that is either given or not; the settings are those of `arg`."""
+    return arg(name, action="store_true", help=purpose, **settings)
 
 
 def value(
@@ -112,6 +116,24 @@ class _Help(argparse.HelpFormatter):
             return action.help
         shown = " ".join(map(str, default)) if isinstance(default, tuple) else default
         return f"{action.help} (default: {shown})"
+
+
+def settings_of(kind: type[Settings], arguments: argparse.Namespace, **others: object) -> Settings:
+    """Return settings from the arguments that have the names of fields, and from `others`.
+
+    Paths become texts, and lists tuples, if the field is one. A field whose argument is not there
+    or was not given keeps its default.
+    """
+    from dataclasses import fields  # slow to import, and not needed for --help
+
+    conversions: dict[object, Callable[[Any], object]] = {"str": str, "tuple": tuple}
+    values = {}
+    for field in fields(kind):
+        value = getattr(arguments, field.name, None)
+        if value is not None:
+            convert = conversions.get(str(field.type).partition("[")[0])
+            values[field.name] = convert(value) if convert else value
+    return kind(**values | others)
 
 
 def fail(message: str, code: int) -> NoReturn:
@@ -202,3 +224,13 @@ def patience(until: str, default_s: float = 120.0) -> Option:
     """Return the option ``--patience-s``; `until` continues "longest time"."""
     limits = number(float, 1.0, 86_400.0)
     return value("--patience-s", limits, "S", f"longest time {until}", default=default_s)
+
+
+def eyes_option(purpose: str) -> Option:
+    """Return the option ``--eyes``, which `eyes_of` reads."""
+    return arg("--eyes", choices=("both", "left", "right"), default="both", help=purpose)
+
+
+def eyes_of(arguments: argparse.Namespace) -> tuple[Eye, ...]:
+    """Return the eyes that ``--eyes`` names."""
+    return ("left", "right") if arguments.eyes == "both" else (arguments.eyes,)

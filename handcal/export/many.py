@@ -79,7 +79,7 @@ def export_sessions(
     for each in together.values():
         for name, rows in each.items():
             tables.setdefault(name, []).extend(rows)
-    last = progress.part(len(paths) / (len(paths) + 1), 1.0)
+    last = progress.part(len(paths) / (len(paths) + 1), 1.0, "All sessions together")
     files += _export_together(tables, missing, folder, settings, last)
     return Exported(tuple(files), tuple(missing), summarise_wearers(tables).sentence)
 

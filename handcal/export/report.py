@@ -117,7 +117,11 @@ def error_text(outcome: SessionOutcome, eye: Eye) -> str:
         return "not solved"
     if drawn.kind == "offline":
         return f"error {arcmin:.1f}′ expected with the offline calibration"
-    is_verified = outcome.results is not None and eye in outcome.results.verified
+    is_verified = (
+        outcome.results is not None
+        and eye in outcome.results.verified
+        and eye in outcome.record.verified_now
+    )
     how = "verified by the wearer" if is_verified and drawn.kind == "solved" else "expected"
     return f"error {arcmin:.1f}′ {how}, {before:.1f}′ before"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
@@ -21,7 +22,7 @@ _QUANTITIES = {
     "before_arcmin": "expected without the calibration",
     "verification_found_arcmin": "found by the wearers' verifications",
     "expected_error_arcmin": "expected with the final φ",
-    "trials_error_arcmin": "in user-test trials of the calibrated φ",
+    "trials_error_arcmin": "in user-test trials, of the φ calibrated then",
 }
 _DEFINED = "mean over the corners of an 8 cm square at 0.4, 0.5 and 0.6 m"
 
@@ -80,7 +81,7 @@ class WearersSummary:
         if before and after:
             text += (
                 f" The expected error in the display ({_DEFINED}) was {_mean_sd(before)} without "
-                f"the calibration and {_mean_sd(after)} with it."
+                f"the calibration and {_mean_sd(after)} with the final φ of each eye."
             )
         if trials:
             text += (
@@ -125,7 +126,7 @@ def summarise_wearers(tables: Mapping[str, Sequence[TableRow]]) -> WearersSummar
         better_with=better.count("applied"),
         better_without=better.count("offline"),
         simulated=len({row["session"] for row in finals if row["simulated"]}),
-        spreads={name: _spread(name, pairs) for name, pairs in values.items() if pairs},
+        spreads={name: spread(name, pairs) for name, pairs in values.items() if pairs},
     )
 
 
@@ -135,7 +136,7 @@ def summary_rows(summary: WearersSummary) -> list[TableRow]:
     del counts["spreads"]
     return [
         *({"quantity": name, "values": count} for name, count in counts.items()),
-        *(asdict(spread) for spread in summary.spreads.values()),
+        *map(asdict, summary.spreads.values()),
     ]
 
 
@@ -147,7 +148,7 @@ def wearers_report(
     finals = [row for row in tables["parameters.csv"] if row.get("final") == "yes"]
     sections = [
         Section("", [_spreads_table(summary)]),
-        Section("Wearers", [_errors_figure(finals), _eyes_table(finals)], starts_page=True),
+        Section("Wearers", [_errors_figure(finals), _eyes_table(finals)]),
         Section("Made", [facts(made_with())]),
     ]
     if left_out:
@@ -173,19 +174,19 @@ def _spreads_table(summary: WearersSummary) -> Table:
         [
             [
                 _QUANTITIES[name],
-                str(spread.wearers),
-                str(spread.values),
-                f"{spread.mean:.2f}",
+                str(found.wearers),
+                str(found.values),
+                f"{found.mean:.2f}",
                 *(
                     NOTHING if sd is None else f"{sd:.2f}"
-                    for sd in (spread.sd_between, spread.sd_within)
+                    for sd in (found.sd_between, found.sd_within)
                 ),
             ]
-            for name, spread in summary.spreads.items()
+            for name, found in summary.spreads.items()
         ],
         "Each wearer counts once, with the mean of their eyes, sessions or trials. Between: "
         "standard deviation of these means; within: of the values about them. Expected errors are "
-        f"the {_DEFINED}. Trials of other φ than the calibrated one count, too.",
+        f"the {_DEFINED}.",
     )
 
 
@@ -260,7 +261,7 @@ def _draw_errors(ax: Axes, rows: Sequence[FigureRow]) -> None:
             errors = [float(row[name] or 0.0) for row in of_eye]
             label = eye if name == "after_arcmin" else None
             ax.plot(errors, places, MARKERS[eye], color=COLORS[eye], mfc=fill, ms=4, label=label)
-    names = [plain(wearer)[:22] for wearer in wearers]
+    names = [textwrap.shorten(plain(wearer), 24, placeholder="…") for wearer in wearers]
     ax.set_yticks(range(len(wearers)), names, parse_math=False, family=families("".join(names)))
     ax.set_ylim(len(wearers) - 0.4, -0.6)
     ax.set_xlim(left=0.0)
@@ -285,7 +286,8 @@ def _trial_errors(corners: Sequence[TableRow]) -> list[tuple[str, float]]:
     return [(wearers[key], sum(errors) / len(errors)) for key, errors in trials.items()]
 
 
-def _spread(quantity: str, pairs: Sequence[tuple[str, float]]) -> Spread:
+def spread(quantity: str, pairs: Sequence[tuple[str, float]]) -> Spread:
+    """Return the spread of values, each with its wearer; ValueError if there are none."""
     by_wearer: dict[str, list[float]] = {}
     for wearer, value in pairs:
         by_wearer.setdefault(wearer, []).append(value)

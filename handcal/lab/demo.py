@@ -25,27 +25,12 @@ from handcal.calibration.states import Observation
 from handcal.core.display import reprojection_arcmin
 from handcal.core.errors import HandcalError
 from handcal.core.progress import Progress
-from handcal.core.types import (
-    EYES,
-    DepthEdges,
-    Eye,
-    EyeDistance,
-    EyePlan,
-    Float64,
-    PlanName,
-    Rig,
-)
+from handcal.core.types import EYES, DepthEdges, Eye, EyeDistance, EyePlan, Float64, PlanName, Rig
 from handcal.register.prior import eye_position_m
 from handcal.register.solve import solve_alignment
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.sim.hand import Side
-from handcal.sim.sensor import (
-    EDGE_SIGMA_PX,
-    PHASE_BORDER_PX,
-    SensorName,
-    border_px,
-    fatten_of,
-)
+from handcal.sim.sensor import EDGE_SIGMA_PX, PHASE_BORDER_PX, SensorName, border_px, fatten_of
 from handcal.sim.wearer import draw_eyes
 from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.faults import Fault

@@ -145,11 +145,11 @@ def output_folder(text: str) -> Path:
     folder = user_path(text).absolute()
     is_in_session = any(os.path.exists(path / JOURNAL) for path in (folder, *folder.parents))
     if is_in_session or find_journals(folder) or find_journals(folder.parent):
-        raise FileError(f"{folder} holds sessions, or lies among them: choose another folder")
+        raise FileError(f"{folder} holds sessions, or lies among them", "choose another folder")
     for file in (folder / "report.pdf", folder / "report.html"):
         if os.path.exists(file) and not may_be_replaced(file):
             raise FileError(
-                f"{folder} holds files that are not of an evaluation, such as {file.name}: "
-                "choose another folder"
+                f"{folder} holds files that are not of an evaluation, such as {file.name}",
+                "choose another folder",
             )
     return folder

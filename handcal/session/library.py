@@ -39,7 +39,7 @@ from handcal.session.state import VERIFYING, SessionEvent, SessionState, clean_w
 from handcal.session.trial import trial_errors_arcmin
 
 _NOTES_CHARACTERS = 200
-_DONE = {SessionEvent.NOTES_SAVED, COMPARED, VERIFYING}
+_DONE = {SessionEvent.NOTES_SAVED, SessionEvent.REPAIRED, COMPARED, VERIFYING}
 """Events that speak against an empty session."""
 DELETED = ".deleted"
 """Folder, inside the folder of sessions, to which deleted sessions are moved."""

@@ -8,11 +8,8 @@ from pathlib import Path
 from handcal.cli.terminal import Parser, errors_in_one_line, number
 from handcal.io.files import make_folder
 from handcal.lab.evaluate.annotations import read_annotations
-from handcal.train.backbone import load_backbone
-from handcal.train.exported import load_exported
 from handcal.train.loop import Pace, Training, TrainSettings, split
-from handcal.train.model import HandNet
-from handcal.train.moments import take_moments
+from handcal.train.model import HandNet, load_backbone, load_exported, take_moments
 from handcal.train.samples import Samples, SampleSettings, collate
 from handcal.train.simulated import render_hands
 

@@ -17,8 +17,7 @@ from handcal.hand.shipped import FLOAT_MODEL, INTEGER_MODEL
 from handcal.io.resources import resource_path
 from handcal.lab.bench.speed import following_ms, simulated_frame
 from handcal.lab.evaluate.annotations import read_annotations
-from handcal.lab.evaluate.detector import EVALUATED, detect_all, summary
-from handcal.lab.evaluate.precision import MATCH_OVERLAP
+from handcal.lab.evaluate.detector import EVALUATED, MATCH_OVERLAP, detect_all, summary
 from handcal.sim.hand import HandSettings
 from handcal.sim.raster import D415
 from handcal.sim.room import make_room

@@ -1,18 +1,30 @@
-"""The detector's network: MobileNetV1, a small feature pyramid, one anchor-free head.
+"""The detector's network, and the trained weights from which its training starts.
 
-Howard et al. 2017 (MobileNet), Lin et al. 2017 (FPN), Tian et al. 2019 (FCOS).
+MobileNetV1, a small feature pyramid, one anchor-free head: Howard et al. 2017 (MobileNet), Lin et
+al. 2017 (FPN), Tian et al. 2019 (FCOS).
 """
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
+import numpy as np
+import onnx
 import torch
+from google.protobuf.message import DecodeError
+from numpy.typing import NDArray
+from onnx import numpy_helper
 from torch import Tensor, nn
 from torch.nn import functional
 
+from handcal.core.errors import FileError
+from handcal.core.types import Float32
 from handcal.hand.detect import STRIDES
+from handcal.io.files import read_limited
 
 # Channels in, channels out and stride of the thirteen separable convolutions: those of MobileNetV1,
 # but fewer where few are useful: at the stem, where 14 of 32 pretrained ones are all zero, and from
@@ -166,3 +178,220 @@ class HandNet(nn.Module):
 
 
 assert len(_TAPS) == len(STRIDES)
+
+
+# Insertion of batch normalisation into a trained network that has none, or has it folded in.
+#
+# Without it training destroys the backbone: at the learning rates of the new layers more and more
+# channels become constant at 0 or 6.
+
+
+def fold_in(normalisation: nn.BatchNorm2d, gain: Tensor, bias: Tensor) -> None:
+    """Set a layer to multiply by `gain` (C,) and add `bias` (C,), with unknown input moments."""
+    normalisation.load_state_dict(
+        {
+            "weight": gain,
+            "bias": bias,
+            "running_mean": torch.zeros_like(bias),
+            "running_var": torch.full_like(bias, 1.0 - normalisation.eps),
+            "num_batches_tracked": torch.tensor(0),
+        }
+    )
+
+
+def take_moments(net: HandNet, images: Tensor) -> None:
+    """Set the moments of normalisation from images; the network's function is unchanged.
+
+    Parameters
+    ----------
+    net : HandNet
+    images : (B, 3, H, W) tensor
+        Similar to the training images.
+    """
+    hooks = [
+        normalisation.register_forward_pre_hook(_take) for _, _, normalisation in net.normalised()
+    ]
+    with torch.no_grad():
+        net.eval()(images.float())
+    for hook in hooks:
+        hook.remove()
+
+
+def _take(normalisation: nn.Module, inputs: tuple[Tensor]) -> None:
+    assert isinstance(normalisation, nn.BatchNorm2d)
+    features = inputs[0].double()
+    mean, variance = features.mean((0, 2, 3)), features.var((0, 2, 3), correction=0)
+    values = normalisation.state_dict()
+    gain = values["weight"] / (values["running_var"] + normalisation.eps).sqrt()
+    normalisation.load_state_dict(
+        values
+        | {
+            "weight": gain * (variance + normalisation.eps).sqrt(),
+            "bias": values["bias"] + gain * (mean - values["running_mean"]),
+            "running_mean": mean,
+            "running_var": variance,
+        }
+    )
+
+
+# The pretrained backbone: an SSD-MobileNetV1 trained to detect faces.
+#
+# It is part of the npm package `@vladmandic/face-api` (MIT), quantised to 8 bits.
+
+_Tensors = dict[str, Float32]
+
+_ROOT = "MobilenetV1/Conv2d_"
+_NAME = "ssd_mobilenetv1_model"
+_EPSILON = 0.001
+# Loading of an exported float model (ONNX), to continue its training.
+#
+# Batch normalisation is folded into the exported convolutions and separated again here.
+
+_MOST_BYTES = 2**25
+
+
+def load_backbone(net: HandNet, folder: Path) -> None:
+    """Fill the network's stem and blocks from the package's folder `model`, in place.
+
+    A block with fewer channels than the package's takes those with the largest product of standard
+    deviation and weight in the next block. `take_moments` must follow.
+
+    Raises
+    ------
+    FileError
+        If the files are missing or not from the package.
+    """
+    try:
+        tensors = _read(folder)
+        blocks = [list(block.children()) for block in net.blocks]
+        kept = [_kept(tensors, number, depthwise) for number, (depthwise, _) in enumerate(blocks)]
+        kept.append(np.arange(_outputs(blocks[-1][1])))
+        _fill(net.stem, *_stem(tensors), kept[0], np.arange(3))
+        for number, (depthwise, pointwise) in enumerate(blocks):
+            _fill(depthwise, *_depthwise(tensors, number), kept[number], np.arange(1))
+            _fill(pointwise, *_pointwise(tensors, number), kept[number + 1], kept[number])
+    except (LookupError, TypeError, ValueError, RuntimeError) as error:
+        raise FileError(f"{folder} holds another network: {error!r}") from error
+
+
+def _read(folder: Path) -> _Tensors:
+    """Return the package's tensors by name, dequantised."""
+    data = read_limited(folder / f"{_NAME}.bin", _MOST_BYTES)
+    manifest = json.loads(read_limited(folder / f"{_NAME}-weights_manifest.json", _MOST_BYTES))
+    tensors, offset = {}, 0
+    for entry in manifest[0]["weights"]:
+        count = int(np.prod(entry["shape"]))
+        if "quantization" not in entry:
+            break  # the last: a constant of the face detector's post-processing
+        values = np.frombuffer(data, np.uint8, count, offset).astype(np.float32)
+        scale: dict[str, Any] = entry["quantization"]
+        tensors[entry["name"]] = (values * scale["scale"] + scale["min"]).reshape(entry["shape"])
+        offset += count
+    return tensors
+
+
+def _stem(tensors: _Tensors) -> tuple[Float32, Float32]:
+    """Return weights, with axes in PyTorch's order, and biases."""
+    weights = tensors[f"{_ROOT}0_pointwise/weights"].transpose(3, 2, 0, 1)
+    return weights, tensors[f"{_ROOT}0_pointwise/convolution_bn_offset"]
+
+
+def _depthwise(tensors: _Tensors, number: int) -> tuple[Float32, Float32]:
+    """Return weights and biases, batch normalisation folded in."""
+    layer = f"{_ROOT}{number + 1}_depthwise"
+    gamma, beta, mean, variance = (
+        tensors[f"{layer}/BatchNorm/{name}"]
+        for name in ("gamma", "beta", "moving_mean", "moving_variance")
+    )
+    factor = (gamma / np.sqrt(variance + _EPSILON)).astype(np.float32)  # as it is already
+    weights = tensors[f"{layer}/depthwise_weights"].transpose(2, 3, 0, 1)
+    return weights * factor[:, None, None, None], beta - mean * factor
+
+
+def _pointwise(tensors: _Tensors, number: int) -> tuple[Float32, Float32]:
+    layer = f"{_ROOT}{number + 1}_pointwise"
+    weights = tensors[f"{layer}/weights"].transpose(3, 2, 0, 1)
+    return weights, tensors[f"{layer}/convolution_bn_offset"]
+
+
+def _kept(tensors: _Tensors, number: int, depthwise: nn.Module) -> NDArray[np.intp]:
+    """Return the channels that a block takes."""
+    deviation = tensors[f"{_ROOT}{number + 1}_depthwise/BatchNorm/gamma"]
+    taken = np.square(deviation) * np.square(_pointwise(tensors, number)[0]).sum((0, 2, 3))
+    order = np.argsort(-taken, kind="stable")
+    return np.sort(order[: _outputs(depthwise)])
+
+
+def _fill(
+    layer: nn.Module,
+    weight: Float32,
+    bias: Float32,
+    outputs: NDArray[np.intp],
+    inputs: NDArray[np.intp],
+) -> None:
+    convolution, normalisation, *_ = layer.children()
+    state = {"weight": torch.from_numpy(weight[outputs][:, inputs])}
+    if isinstance(normalisation, nn.BatchNorm2d):
+        fold_in(normalisation, torch.ones(len(outputs)), torch.from_numpy(bias[outputs]))
+    else:
+        state["bias"] = torch.from_numpy(bias[outputs])
+    convolution.load_state_dict(state)
+
+
+def _outputs(layer: nn.Module) -> int:
+    return len(layer.get_parameter("0.weight"))
+
+
+# Norm of each channel's weights, which normalisation makes arbitrary: about that of the backbone,
+# so that the same learning rates apply.
+_LENGTH = 1.5
+
+
+def load_exported(net: HandNet, path: Path) -> None:
+    """Fill a network with the weights of a model written by `export_float`, in place.
+
+    It then computes the same as the model; `take_moments` must follow before training.
+
+    Raises
+    ------
+    FileError
+        If the file is missing or holds another network.
+    """
+    try:
+        model = onnx.load_from_string(read_limited(path, _MOST_BYTES))
+        _fill_from_graph(net, model.graph)
+    except (DecodeError, LookupError, TypeError, ValueError, RuntimeError) as error:
+        raise FileError(f"{path} holds another network: {error!r}") from error
+
+
+def _fill_from_graph(net: HandNet, graph: onnx.GraphProto) -> None:
+    """Set all weights so that the network computes the same as the graph, with moments 0 and 1."""
+    values = {
+        tensor.name: torch.from_numpy(numpy_helper.to_array(tensor).copy())
+        for tensor in graph.initializer
+    }
+    own = {name.removeprefix("_net."): value for name, value in values.items()}
+    net.load_state_dict({name: own[name] for name in net.state_dict() if name in own}, strict=False)
+    folded = {
+        node.name: [values[name] for name in node.input[1:]]
+        for node in graph.node
+        if node.op_type == "Conv"
+    }
+    units = list(net.normalised())
+    with torch.no_grad():
+        for name, convolution, _ in units:
+            weight, _ = folded[_node(name)]
+            length = weight.flatten(1).norm(dim=1).clamp_min(1e-9)
+            convolution.weight.copy_(_LENGTH * weight / length[:, None, None, None])
+        for name, convolution, normalisation in units:
+            # Levels that share a convolution differ only by a factor for each channel.
+            weight, bias = folded[_node(name)]
+            gain = (weight * convolution.weight).sum((1, 2, 3)) / _LENGTH**2
+            fold_in(normalisation, gain, bias)
+
+
+def _node(name: str) -> str:
+    """Return the exporter's name of a layer's convolution: a.0/a.0.1/a.0.1.0 for a.0.1."""
+    parts = name.split(".")
+    scopes = [".".join(parts[:end]) for end in range(2, len(parts) + 1)]
+    return "/".join(["/_net", *scopes, f"{name}.0", "Conv"])

@@ -9,6 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import torch
+from cv2.typing import MatLike
 from torch import Tensor
 from torch.utils.data import Dataset
 
@@ -16,15 +17,15 @@ from handcal.core.types import Float32, Float64, UInt8
 from handcal.io.files import read_json
 from handcal.io.images import read_image
 from handcal.lab.evaluate.annotations import Photo
-from handcal.train.augment import (
-    blemish,
-    box_corners,
-    clipped,
-    random_warp,
-    relight,
-    transform_corners,
-)
 
+# Side of a square with as many pixels as the detector's input.
+_WHOLE_PX = 332.0
+# Share of the crops around a hand that are centred on it. The others show any part of the
+# photograph at the same scale: faces, arms and other objects.
+_CENTERED = 0.72
+_ZOOM_MAX = 4.0  # largest enlargement of a photograph
+# Relative probability of photographs in which a hand fills 15 % or more.
+_LARGE_WEIGHT = 2.0
 _SHOWN_MIN = 0.35
 _SMALLEST_PX = 9.0
 _GRAY = (127, 127, 127)
@@ -42,18 +43,9 @@ class SampleSettings:
 
     side_px: int = 288
     """Side of the square crops; a multiple of the largest stride."""
-    whole_px: float = 332.0
-    """Side of a square with as many pixels as the detector's input."""
     zoomed: float = 0.5
     """Share of crops scaled so that one hand fills 12–85 % of the side, like a wearer's; the others
     have about the scale of the detector's input."""
-    centered: float = 0.72
-    """Share of these crops centred on that hand. The others show any part of the photograph at the
-    same scale: faces, arms and other objects."""
-    zoom_max: float = 4.0
-    """Largest enlargement of a photograph."""
-    large_weight: float = 2.0
-    """Relative probability of photographs in which a hand fills 15 % or more."""
     simulated: float = 0.1
     pasted: float = 0.08
     """Shares of simulated images, and of photographs with a simulated hand."""
@@ -87,7 +79,7 @@ class Samples(Dataset[tuple[UInt8, Float32]]):
         self._seed = seed
         weights = np.array(
             [
-                settings.large_weight if photo.relative_sizes.max(initial=0.0) >= 0.15 else 1.0
+                _LARGE_WEIGHT if photo.relative_sizes.max(initial=0.0) >= 0.15 else 1.0
                 for photo in photos
             ]
         )
@@ -122,15 +114,15 @@ class Samples(Dataset[tuple[UInt8, Float32]]):
         """Select a part of a photograph: around one of its hands, or anywhere."""
         settings = self._settings
         image_px = np.sqrt(photo.width * photo.height)
-        scale = settings.whole_px / image_px * np.exp(rng.uniform(np.log(0.75), np.log(1.5)))
+        scale = _WHOLE_PX / image_px * np.exp(rng.uniform(np.log(0.75), np.log(1.5)))
         center = rng.uniform(0.0, 1.0, 2) * (photo.width, photo.height)
         if len(photo.boxes):
             sizes = photo.relative_sizes
             hand = rng.choice(len(sizes), p=sizes / sizes.sum())
             if rng.random() < settings.zoomed:
                 wanted_px = settings.side_px * np.exp(rng.uniform(np.log(0.12), np.log(0.85)))
-                scale = min(wanted_px / (sizes[hand] * image_px), settings.zoom_max)
-            if rng.random() < settings.centered:
+                scale = min(wanted_px / (sizes[hand] * image_px), _ZOOM_MAX)
+            if rng.random() < _CENTERED:
                 center = (photo.boxes[hand, :2] + photo.boxes[hand, 2:]) / 2
         size_px = photo.width, photo.height
         return random_warp(rng, size_px, center, scale, settings.side_px, _PHOTO_TURN_RAD)
@@ -202,3 +194,122 @@ def collate(samples: list[tuple[UInt8, Float32]]) -> tuple[Tensor, list[Tensor]]
     """Return images (B, 3, side, side) uint8, channels last in memory, and their boxes."""
     images = torch.from_numpy(np.stack([image for image, _ in samples]))
     return images.permute(0, 3, 1, 2), [torch.from_numpy(boxes) for _, boxes in samples]
+
+
+# Random views of an image, as a headset's camera might take them.
+#
+# Maps and boxes are in pixels from the image's upper left corner.
+
+
+def transform_corners(warp: Float64, corners: Float64) -> Float64:
+    """Return the upright boxes (M, 4) of corners (M, 4, 2) after an affine map (2, 3)."""
+    moved = corners @ warp[:, :2].T + warp[:, 2]
+    return np.concatenate([moved.min(1), moved.max(1)], axis=1)
+
+
+def box_corners(boxes: Float64) -> Float64:
+    """Return the corners (M, 4, 2) of upright boxes (M, 4)."""
+    return boxes[:, [0, 1, 2, 1, 2, 3, 0, 3]].reshape(-1, 4, 2)
+
+
+def random_warp(
+    rng: np.random.Generator,
+    size_px: tuple[int, int],
+    center: Float64,
+    scale: float,
+    side_px: int,
+    turn_rad: float,
+) -> Float64:
+    """Return a map (2, 3) of an image to a square of that side that shows `center`.
+
+    It scales, rotates half the time, mirrors half the time, and stretches by up to 10 %; usually
+    it is shifted so that little of the square is outside the image.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    size_px : (int, int)
+        Width and height of the image.
+    center : (2,) float64
+    scale : float
+    side_px : int
+    turn_rad : float
+        Largest rotation.
+    """
+    angle = rng.uniform(-turn_rad, turn_rad) * (rng.random() < 0.5)
+    stretch = np.exp(rng.uniform(-0.1, 0.1) / 2)
+    mirror = rng.choice([-1.0, 1.0])
+    cos, sin = np.cos(angle), np.sin(angle)
+    linear = np.array([[cos, -sin], [sin, cos]]) @ np.diag([mirror * stretch, 1.0 / stretch])
+    linear *= scale
+    warp = np.column_stack([linear, side_px * rng.uniform(0.1, 0.9, 2) - linear @ center])
+    if rng.random() < 0.9:
+        whole = np.array([[0.0, 0.0, *size_px]])
+        low, high = transform_corners(warp, box_corners(whole))[0].reshape(2, 2)
+        slack = side_px - (high - low)  # negative where the image is larger than the square
+        warp[:, 2] += low.clip(np.minimum(slack, 0.0), np.maximum(slack, 0.0)) - low
+    return warp
+
+
+def clipped(boxes: Float64, side_px: int, shown_min: float, smallest_px: float) -> Float32:
+    """Return boxes clipped to the square, with 1 appended if too little is left to learn from.
+
+    Parameters
+    ----------
+    boxes : (M, 4) float64
+    side_px : int
+    shown_min : float
+        Least visible share of a hand.
+    smallest_px : float
+        Least square root of a hand's area.
+
+    Returns
+    -------
+    (K, 5) float32
+        Without boxes outside the view.
+    """
+    cut = boxes.clip(0.0, side_px)
+    area, cut_area = (np.prod(b[:, 2:] - b[:, :2], axis=1) for b in (boxes, cut))
+    unfit = (cut_area < shown_min * area) | (cut_area < smallest_px**2)
+    seen = cut_area > 0.0
+    boxes_left: Float32 = np.column_stack([cut, unfit])[seen].astype(np.float32)
+    return boxes_left
+
+
+def relight(rng: np.random.Generator, image: MatLike) -> MatLike:
+    """Change hue, saturation, brightness and contrast, and the colour of the light."""
+    if rng.random() < 0.5:
+        hsv = cv2.cvtColor(image, cv2.COLOR_RGB2HSV_FULL)
+        saturation = np.clip(np.arange(256) * rng.uniform(0.5, 1.5), 0, 255)
+        hue = (np.arange(256) + rng.uniform(-12, 12)) % 256
+        table = np.stack([hue, saturation, np.arange(256)], axis=1).astype(np.uint8)
+        image = cv2.cvtColor(cv2.LUT(hsv, table[:, None]), cv2.COLOR_HSV2RGB_FULL)
+    if rng.random() < 0.05:
+        image = np.repeat(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)[..., None], 3, axis=2)
+    if rng.random() < 0.7:
+        strength = rng.choice([0.1, 0.3], p=[0.7, 0.3])
+        gain = np.exp(rng.uniform(-0.5, 0.3)) * np.exp(rng.normal(0.0, strength / 2, 3))
+        gamma = np.exp(rng.uniform(-0.4, 0.4))
+        contrast = np.exp(rng.uniform(-0.4, 0.3))
+        level = np.linspace(0.0, 1.0, 256)[:, None] ** gamma
+        level = ((level - 0.5) * contrast + 0.5) * gain
+        table = (255.0 * level).clip(0, 255).astype(np.uint8)
+        image = cv2.LUT(image, table[:, None])
+    return image
+
+
+def blemish(rng: np.random.Generator, image: MatLike) -> MatLike:
+    """Blur like a lens or a moving hand, and add sensor noise."""
+    if rng.random() < 0.15:
+        image = cv2.GaussianBlur(image, (0, 0), rng.uniform(0.4, 2.0))
+    if rng.random() < 0.1:
+        length = 2 * int(rng.integers(1, 5)) + 1  # odd, so that nothing is shifted
+        line = np.zeros((length, length), np.float32)
+        cv2.line(line, (0, length // 2), (length - 1, length // 2), 1.0)
+        turn = cv2.getRotationMatrix2D((length / 2 - 0.5,) * 2, rng.uniform(0, 180), 1.0)
+        kernel = cv2.warpAffine(line, turn, (length, length))
+        image = cv2.filter2D(image, -1, kernel / kernel.sum())
+    if rng.random() < 0.25:
+        noise = rng.normal(0.0, rng.uniform(2.0, 14.0), image.shape)
+        image = (image + noise).clip(0, 255).astype(np.uint8)
+    return image

@@ -8,7 +8,6 @@ import gc
 import logging
 import signal
 import sys
-import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -18,23 +17,22 @@ from types import TracebackType
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QIcon
-from PySide6.QtWidgets import QApplication, QComboBox, QLineEdit, QWidget
+from PySide6.QtWidgets import QApplication, QWidget
 
 from handcal.camera.live import is_live
 from handcal.core.errors import HandcalError
 from handcal.io.files import make_folder
 from handcal.io.resources import resource_path
 from handcal.station.settings import StationSettings, with_source
-from handcal_gui.app.autopilot.demonstration import Demonstration
+from handcal_gui.app.autopilot import Demonstration
 from handcal_gui.app.preferences import PreferencesFile
 from handcal_gui.app.program import Program
 from handcal_gui.app.translation import tr
 from handcal_gui.engine.garbage import collect_in_this_thread
-from handcal_gui.widgets.placement import show_on_screen
 
 _LOG_BYTES = 2**20
-_ACTIVE_S = 0.3
-"""Longest wait for the main window to have the keyboard."""
+_TITLE_PX = 40
+"""Height of a title bar and the edges, which a window manager adds only later."""
 
 
 class LaunchError(Exception):
@@ -75,43 +73,22 @@ def launch(app: QApplication, arguments: argparse.Namespace, first: QWidget) -> 
         program.window.setWindowState(Qt.WindowState.WindowNoState)  # it was maximized when closed
         program.window.resize(arguments.size)
         program.window.show()
+    elif program.window.height() < program.window.screen().availableSize().height() - _TITLE_PX:
+        program.window.show()
     else:
-        show_on_screen(program.window)
-    typed = _typed_meanwhile(first, program.window)
+        program.window.showMaximized()
     first.close()
     try:
         demonstration = _begin(program, arguments)
     except HandcalError as error:
         program.close()
         raise LaunchError(error, 2) from error
-    field = program.window.focusWidget()
-    if typed and isinstance(field, QComboBox) and field.isEditable():
-        field.setEditText(typed + field.currentText())
     gc.freeze()  # all of this stays; searching it for garbage held up the window by 0.1 s
     collect_in_this_thread(app)
-    if program.window.isVisible():  # or it was closed meanwhile, and nothing would end the loop
-        app.exec()
+    app.exec()
     program.close()
     if demonstration is not None and demonstration.complaint is not None:
         raise LaunchError(demonstration.complaint, 1)
-
-
-def _typed_meanwhile(first: QWidget, window: QWidget) -> str:
-    """Return the text typed into the first window, until the main window has the keyboard.
-
-    Its events have waited until now. A text field takes them: no other key may do anything, as
-    nobody saw what it would press.
-    """
-    line = QLineEdit(first)
-    line.setGeometry(-1, -1, 1, 1)  # not seen
-    line.show()
-    line.setFocus()
-    deadline_s = time.monotonic() + _ACTIVE_S
-    QApplication.processEvents()
-    while first.isActiveWindow() and not window.isActiveWindow() and time.monotonic() < deadline_s:
-        time.sleep(0.002)
-        QApplication.processEvents()
-    return line.text().lstrip()
 
 
 def close_on_signals(window: QWidget, close: Callable[[], object]) -> None:

@@ -26,7 +26,6 @@ from handcal_gui.widgets.drawing import themed_drawing
 from handcal_gui.widgets.fields import tool_button, with_name
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.opening import open_path
-from handcal_gui.widgets.placement import keep_on_screen
 
 _FIRST_SIZE = QSize(1000, 750)
 _CONTENTS_PX = 240
@@ -153,7 +152,6 @@ class Manual(QDialog):
         url = QUrl.fromLocalFile(str(resource_path(file)))
         url.setFragment(heading)
         self.page.setSource(url)
-        keep_on_screen(self)
         self.raise_()
         self.activateWindow()
         self.page.setFocus()

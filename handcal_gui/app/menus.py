@@ -20,7 +20,6 @@ from handcal_gui.app.translation import tr
 from handcal_gui.calibrate.window import MainWindow
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.opening import open_path
-from handcal_gui.widgets.placement import keep_on_screen
 
 _EDITS = {
     "undo": tr("&Undo"),
@@ -99,7 +98,6 @@ def show_keys(window: MainWindow) -> QDialog:
     assert isinstance(text, QTextBrowser)
     text.setHtml(keys_html(window))
     dialog.show()
-    keep_on_screen(dialog)
     return dialog
 
 

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from PySide6.QtGui import QHideEvent, QIcon, QShowEvent
+from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QCheckBox, QComboBox, QDialog, QDialogButtonBox, QWidget
 
-from handcal.bridge.bridges import BridgeSettings
-from handcal.station.checks.doctor import Finding, Health
-from handcal.station.checks.preflight import check_sessions, gate_problem
-from handcal.station.settings import StationSettings
+from handcal.station.checks.preflight import gate_problem
 from handcal_gui.app.preferences import Preferences, Theme
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
 from handcal_gui.calibrate.start.calibration_fields import CalibrationFields
-from handcal_gui.engine.latest_job import LatestJob
+from handcal_gui.widgets.entries_form import Bound
 from handcal_gui.widgets.fields import (
     choice,
     make_equally_wide,
@@ -24,8 +21,7 @@ from handcal_gui.widgets.fields import (
     whole_number,
     with_name,
 )
-from handcal_gui.widgets.finding_line import FindingLine
-from handcal_gui.widgets.layouts import fit_soon, scrollable, vbox
+from handcal_gui.widgets.layouts import scrollable, vbox
 from handcal_gui.widgets.path_field import PathField
 
 _THEMES: dict[Theme, str] = {
@@ -71,7 +67,7 @@ _LSL_HELP = tr(
 class PreferencesDialog(QDialog):
     """Theme, session folder, bridges, and the settings of future calibrations.
 
-    Settings with which no calibration could start are refused beside their fields.
+    A depth gate without room for a hand is refused beside its fields.
 
     Parameters
     ----------
@@ -86,8 +82,6 @@ class PreferencesDialog(QDialog):
         self._preferences = preferences
         self._theme = choice("theme", tr("Theme"), _THEMES)
         self._sessions = PathField(tr("Session folder"), "folder")
-        self._sessions_found = FindingLine("sessions")
-        self._sessions_found.hide()
         self._calibration = CalibrationFields(explains=True)
         self._target = number("target", 1.0, 60.0, 0.5, " ′", _TARGET_HELP)
         self._learn = choice("learnPrior", tr("Learned"), _LEARNED, _LEARN_HELP)
@@ -104,61 +98,42 @@ class PreferencesDialog(QDialog):
             | QDialogButtonBox.StandardButton.Cancel
             | QDialogButtonBox.StandardButton.RestoreDefaults
         )
-        self._fit_soon = fit_soon(self._fit, self)
+        self._bound = Bound(
+            {
+                "theme": self._theme,
+                "bridges.slicer_host": self._slicer,
+                "bridges.slicer_port": self._port,
+                "bridges.lsl": self._lsl,
+                "station.sessions": self._sessions,
+                "station.calibration.solve.verdict.target_arcmin": self._target,
+            },
+            parent=self,
+        )
         self._lay_out()
-        self._is_accepting = self._is_folder_refused = False
-        self._check = LatestJob(check_sessions, self)
-        self._check.answered.connect(self._on_checked)
         self._show(preferences)
-        self._sessions.changed.connect(self._on_folder_changed)
         self._calibration.changed.connect(self._refresh)
         self._refresh()
 
     def preferences(self) -> Preferences:
         """Return the preferences with the values shown."""
-        station = self._preferences.station
-        calibration = self._calibration.take(station.calibration)
-        solve = calibration.solve
-        verdict = replace(solve.verdict, target_arcmin=self._target.value())
+        shown = self._bound.take(self._preferences)
+        station = shown.station
         learned = self._learn.currentData().split()
-        return replace(
-            self._preferences,
-            theme=self._theme.currentData(),
-            bridges=BridgeSettings(
-                self._slicer.currentData(), self._port.value(), self._lsl.isChecked()
-            ),
-            station=replace(
-                station,
-                sessions=self._sessions.path or station.sessions,
-                learn_prior="eyes" in learned,
-                use_far_prior="far" in learned,
-                learn_wearers="wearers" in learned,
-                calibration=replace(calibration, solve=replace(solve, verdict=verdict)),
-            ),
+        station = replace(
+            station,
+            sessions=station.sessions or self._preferences.station.sessions,
+            learn_prior="eyes" in learned,
+            use_far_prior="far" in learned,
+            learn_wearers="wearers" in learned,
+            calibration=self._calibration.take(station.calibration),
         )
-
-    def accept(self) -> None:
-        """Close the dialog, unless the session folder is refused once it is checked."""
-        self._is_accepting = True
-        self._check_folder()
-
-    def showEvent(self, event: QShowEvent) -> None:
-        """Check the session folder."""
-        super().showEvent(event)
-        self._check_folder()
-
-    def hideEvent(self, event: QHideEvent) -> None:
-        """Wait for the end of the check."""
-        super().hideEvent(event)
-        self._check.stop()
+        return replace(shown, station=station)
 
     def _show(self, preferences: Preferences) -> None:
         """Show the values of preferences."""
-        station, bridges = preferences.station, preferences.bridges
-        self._theme.setCurrentIndex(self._theme.findData(preferences.theme))
-        self._sessions.set_path(station.sessions)
+        station = preferences.station
+        self._bound.show(preferences)
         self._calibration.show_settings(station.calibration)
-        self._target.setValue(station.calibration.solve.verdict.target_arcmin)
         words = {
             "eyes": station.learn_prior,
             "far": station.use_far_prior,
@@ -166,45 +141,13 @@ class PreferencesDialog(QDialog):
         }
         learned = " ".join(word for word, is_set in words.items() if is_set)
         self._learn.setCurrentIndex(max(0, self._learn.findData(learned)))
-        self._slicer.setCurrentIndex(self._slicer.findData(bridges.slicer_host))
-        self._port.setValue(bridges.slicer_port)
-        self._port.setEnabled(bool(bridges.slicer_host))
-        self._lsl.setChecked(bridges.lsl)
-
-    def _on_folder_changed(self) -> None:
-        self._is_accepting = False
-        self._check_folder()
-
-    def _check_folder(self) -> None:
-        """Check the session folder in a job: it may be on a slow network."""
-        self._check.ask(replace(self._preferences.station, sessions=self._sessions.path))
-
-    def _on_checked(self, asked: StationSettings, found: Finding) -> None:
-        is_broken = found.health is Health.BROKEN
-        # A folder that was good once, as on a stick, does not keep the rest from being changed.
-        self._is_folder_refused = is_broken and asked != self._preferences.station
-        self._sessions_found.setVisible(is_broken)
-        self._sessions_found.show_finding(found)
-        is_accepting, self._is_accepting = self._is_accepting, False
-        self._refresh()
-        if is_accepting and self._ok.isEnabled():
-            super().accept()
+        self._port.setEnabled(bool(preferences.bridges.slicer_host))
 
     def _refresh(self) -> None:
         """Show what is wrong with the depth gate, and allow OK unless something is refused."""
         problem = gate_problem(self.preferences().station)
         self._calibration.show_gate_problem(problem)
-        self._ok.setEnabled(problem is None and not self._is_folder_refused)
-        self._fit_soon.start()
-
-    def _fit(self) -> None:
-        """Make the dialog higher for what is wrong; where the screen is too low, scroll to it."""
-        room_px = self.screen().availableGeometry().bottom() - self.frameGeometry().bottom()
-        missing_px = self._area.verticalScrollBar().maximum()
-        self.resize(self.width(), self.height() + max(0, min(missing_px, room_px)))
-        for line in (self._calibration.gate_found, self._sessions_found):
-            if line.isVisible():
-                self._area.ensureWidgetVisible(line)
+        self._ok.setEnabled(problem is None)
 
     def _lay_out(self) -> None:
         add = self._calibration.add_row
@@ -221,7 +164,6 @@ class PreferencesDialog(QDialog):
         self._calibration.add_heading(tr("Program"))
         add(tr("The&me"), self._theme, tr("Colours of all windows."))
         add(tr("Session f&older"), self._sessions)
-        self._calibration.add_line(self._sessions_found)
         make_equally_wide(self._calibration.findChildren(QComboBox))
         buttons = self._buttons
         for one in buttons.buttons():
@@ -233,7 +175,7 @@ class PreferencesDialog(QDialog):
         defaults.setText(tr("Restore &defaults"))
         defaults.setToolTip(tr("Shows the default of every field; Cancel keeps the former values."))
         defaults.clicked.connect(lambda: self._show(Preferences()))
-        self._area = area = scrollable(self._calibration)
+        area = scrollable(self._calibration)
         about = paragraph(
             "about",
             tr("Change what you need and press OK. A running calibration keeps its settings."),

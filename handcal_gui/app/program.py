@@ -89,7 +89,13 @@ class Program(QObject):
         self.live = CalibrationController(self.window, self.wizard_panel)
         self.review = ReviewController(self.window, review_page)
         self.windows = SeparateWindows(
-            self.window, self.start, self.live, self.review, self._current
+            self.window,
+            self.start,
+            self.live,
+            self.review,
+            self._current,
+            self.open_session,
+            self.resume_session,
         )
         self._connect(review_page)
         self._make_menus()
@@ -211,8 +217,6 @@ class Program(QObject):
         self.start.new.form.calibrate_rig.clicked.connect(lambda: self.windows.calibrate_rig())
         self.start.new.form.connect_headset = self.windows.connect_headset
         self.start.evaluate.clicked.connect(lambda: self.windows.evaluate())
-        self.windows.open_requested.connect(self.open_session)
-        self.windows.resume_requested.connect(self.resume_session)
         self.live.ended.connect(self._on_ended)
         self.live.opened.connect(self._current.add_session)
         self.live.on = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from datetime import datetime
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,7 +15,7 @@ from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QWidget
 
 from handcal.core.errors import FileError, HandcalError
 from handcal.core.progress import Progress
-from handcal.export.export import ExportSettings, export_session
+from handcal.export.export import ExportSettings, export_name, export_session
 from handcal.export.many import Exported, export_sessions
 from handcal.link.server import HeadsetServer
 from handcal.rig.rig_file import read_rig
@@ -36,7 +37,6 @@ from handcal_gui.connect.openxr_dialog import OpenxrDialog
 from handcal_gui.evaluate.entries import EvaluationEntries
 from handcal_gui.library.export_dialog import Export, ExportDialog
 from handcal_gui.widgets.numbers import pluralize
-from handcal_gui.widgets.placement import keep_on_screen
 
 if TYPE_CHECKING:  # imported when they open: they take longer than all the rest
     from handcal_gui.evaluate.window import EvaluationWindow
@@ -54,15 +54,10 @@ class SeparateWindows(QObject):
     live : CalibrationController
     review : ReviewController
     current : CurrentPreferences
-
-    Attributes
-    ----------
-    open_requested, resume_requested : Signal(Path)
-        A session to open, or to resume.
+    open_session, resume_session : callable
+        Open a stored session, or resume it, by its folder.
     """
 
-    open_requested = Signal(object)
-    resume_requested = Signal(object)
     _ending = Signal()
 
     def __init__(
@@ -72,8 +67,11 @@ class SeparateWindows(QObject):
         live: CalibrationController,
         review: ReviewController,
         current: CurrentPreferences,
+        open_session: Callable[[Path], object],
+        resume_session: Callable[[Path], object],
     ) -> None:
         super().__init__()
+        self._open_session, self._resume_session = open_session, resume_session
         self._window, self._start = window, start
         self._live, self._review = live, review
         self._current = current
@@ -98,7 +96,7 @@ class SeparateWindows(QObject):
             self._window, tr("Open a session's folder"), self._current.now.station.sessions
         )
         if folder:
-            self.open_requested.emit(Path(folder))
+            self._open_session(Path(folder))
 
     def why_no_export(self) -> str:
         """Return why the session shown cannot be exported; empty if it can, or if none is shown."""
@@ -132,7 +130,7 @@ class SeparateWindows(QObject):
         def export(target: Path, settings: ExportSettings, progress: Progress) -> Exported:
             return Exported(export_session(record, target, settings, progress))
 
-        name, wearer = record.path.absolute().name, record.wearer
+        name, wearer = export_name(record), record.wearer
         folder = folder or self._export_folder(record.path.parent)
         return self._open_export(name, folder, export, wearer, self._window)
 
@@ -156,8 +154,8 @@ class SeparateWindows(QObject):
             from handcal_gui.library.window import LibraryWindow
 
         window = LibraryWindow(folder, self._window)
-        window.open_requested.connect(self.open_requested)
-        window.resume_requested.connect(self.resume_requested)
+        window.open_requested.connect(self._open_session)
+        window.resume_requested.connect(self._resume_session)
         window.export_requested.connect(lambda paths: self.export_many(paths, window))
         for changed in (window.changed, window.finished):  # closing cancels what runs
             changed.connect(self._review.read_wearer)
@@ -166,14 +164,15 @@ class SeparateWindows(QObject):
         return window
 
     def export_many(self, paths: Sequence[Path], parent: QWidget) -> ExportDialog:
-        """Open the export dialog for several sessions, each to a folder of its own."""
+        """Open the export dialog for several sessions: each alone, and all together."""
 
         def export(target: Path, settings: ExportSettings, progress: Progress) -> Exported:
             return export_sessions(paths, target, settings, progress)
 
-        name = pluralize(len(paths), tr("session"), tr("sessions"))
+        title = pluralize(len(paths), tr("session"), tr("sessions"))
+        name = f"{datetime.now():%Y-%m-%d}-{len(paths)}-sessions"
         folder = self._export_folder(paths[0].parent)
-        return self._open_export(name, folder, export, "", parent)
+        return self._open_export(name, folder, export, title, parent)
 
     def inspect(self) -> None:
         """Show the alignments of the session shown in a 3D window."""
@@ -212,8 +211,8 @@ class SeparateWindows(QObject):
             self._window.banner.show_message(str(error))
             return None
         read = partial(read_manual, self._window)
-        wizard = RigWizard(folder, self._window, self._start.new.settings.realsense, read)
-        wizard.rig_saved.connect(self._use_rig)
+        realsense = self._start.new.settings.realsense
+        wizard = RigWizard(folder, self._window, realsense, read, self._use_rig)
         wizard.finished.connect(self._start.new.check)
         self._open(wizard, wizard.accept)
         return wizard
@@ -233,13 +232,12 @@ class SeparateWindows(QObject):
         entries, proposed = self._current.now.evaluation, self._current.now.station.sessions
         if not entries.users.sessions:
             entries = replace(entries, users=replace(entries.users, sessions=proposed))
-        window = EvaluationWindow(make_specs(), entries, self._window)
+        read = partial(read_manual, self._window)
+        window = EvaluationWindow(make_specs(), entries, self._window, read)
         window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         window.remembered.connect(partial(self._remember_evaluation, proposed))
-        window.manual_wanted.connect(partial(read_manual, self._window))
         self._ending.connect(window.stop)
         window.show()
-        keep_on_screen(window)
         return window
 
     def make_support_bundle(self) -> SupportDialog:
@@ -255,7 +253,6 @@ class SeparateWindows(QObject):
         """Let the user change the preferences."""
         self._start.keep_entries(self._current)
         dialog = PreferencesDialog(self._current.now, self._window)
-        keep_on_screen(dialog)
         if dialog.exec():
             self._current.use(dialog.preferences())
             use_theme(self._current.now.theme)
@@ -279,7 +276,6 @@ class SeparateWindows(QObject):
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self._ending.connect(stop)
         dialog.open()
-        keep_on_screen(dialog)
 
     def _use_rig(self, path: Path) -> None:
         station = replace(self._current.now.station, rig=str(path))

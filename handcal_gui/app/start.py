@@ -29,7 +29,7 @@ _EXPOSED_S = 0.3
 
 
 def main() -> NoReturn:
-    """Run the program; the exit status is 0, 1 if it fails, 2 for wrong arguments."""
+    """Run the program; the exit status is 0, 1 if it fails, 2 for wrong arguments or no display."""
     arguments = _parser().parse_args()
     _require_display()
     keep_font_list_in_configuration()
@@ -160,12 +160,12 @@ def _require_display() -> None:
         return
     display = os.environ.get("DISPLAY")
     if not display:
-        _fail("no display found; `handcal demo` runs the same calibration without one", 1)
+        _fail("no display found; `handcal demo` runs the same calibration without one", 2)
     if not x_server_answers(display):
         _fail(
             f"cannot connect to the X server at DISPLAY={display}; start it, or set DISPLAY to "
             "a server that accepts connections from you, or use `handcal demo`, which needs none",
-            1,
+            2,
         )
 
 

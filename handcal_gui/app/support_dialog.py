@@ -6,20 +6,18 @@ from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
-from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QDialog, QFormLayout, QWidget
 
 from handcal.core.progress import Progress
-from handcal.io.files import require_writable, user_path
+from handcal.io.files import user_path
 from handcal.station.checks.doctor import Finding, Health
 from handcal.station.checks.support import SupportSettings, run_support
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
 from handcal_gui.engine.jobs import Job
-from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.widgets.fields import button, label_for, main_button, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
-from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.path_field import PathField
 
 _ABOUT = tr(
@@ -50,7 +48,6 @@ class SupportDialog(QDialog):
         self.setWindowTitle(tr("Support bundle"))
         self._settings = settings
         self._job: Job | None = None
-        self._fit_soon = fit_soon(self._fit, self)
         self._folder = PathField(tr("Folder"), "folder")
         self._folder.set_path(str(folder))
         self._folder.setMinimumWidth(45 * SPACING_PX)
@@ -62,10 +59,7 @@ class SupportDialog(QDialog):
         self._said.hide()
         self._write = main_button("writeBundle", tr("&Write"))
         close = button("close", tr("&Close"))
-        self._check = LatestJob(require_writable, self)  # the folder may be on a slow network
-        self._check.answered.connect(lambda: self._refuse(""))
-        self._check.failed.connect(self._refuse)
-        self._folder.changed.connect(self._check_folder)
+        self._folder.changed.connect(lambda: self._write.setEnabled(bool(self._folder.path)))
         self._write.clicked.connect(self.write)
         close.clicked.connect(self.reject)
         self.finished.connect(self.stop)
@@ -83,12 +77,6 @@ class SupportDialog(QDialog):
             margins=2 * SPACING_PX,
             spacing=2 * SPACING_PX,
         )
-
-    def showEvent(self, event: QShowEvent) -> None:
-        """Check the folder."""
-        super().showEvent(event)
-        if not event.spontaneous():  # not when it was minimized
-            self._check_folder()
 
     def write(self) -> None:
         """Write the bundle."""
@@ -113,7 +101,6 @@ class SupportDialog(QDialog):
 
     def stop(self) -> None:
         """Cancel the writing; safe to call twice."""
-        self._check.stop()
         if self._job is not None:
             self._job.abandon()
             self._job = None
@@ -130,29 +117,7 @@ class SupportDialog(QDialog):
         for part in (self._folder, self._frames, self._write):
             part.setEnabled(not is_writing)
 
-    def _check_folder(self) -> None:
-        self._write.setEnabled(False)  # until an answer, which would hide how the writing ended
-        if self._folder.path:
-            self._check.ask(user_path(self._folder.path))
-        else:
-            self._refuse("")
-
-    def _refuse(self, problem: str) -> None:
-        """Say why the folder is refused; otherwise allow to write, and name the file."""
-        if not self._folder.path:
-            problem = tr("Choose the folder to write to.")
-        self._write.setEnabled(not problem)
-        self._doing.setText("" if problem else self._will)
-        self._show(Finding("", Health.BROKEN, problem) if problem else None)
-
     def _show(self, found: Finding | None) -> None:
         self._said.setVisible(found is not None)
         if found is not None:
             self._said.show_finding(found)
-        self._fit_soon.start()
-
-    def _fit(self) -> None:
-        """Make the dialog higher for what is said: it was cut off, or cut the text above."""
-        layout = self.layout()
-        assert layout is not None
-        self.resize(self.width(), max(self.height(), layout.totalHeightForWidth(self.width())))

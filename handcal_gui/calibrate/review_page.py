@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFormLayout, QLabel, QWidget
 
-from handcal.core.types import Eye
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
 from handcal_gui.app.theme import SPACING_PX, scale_font
@@ -17,10 +14,8 @@ from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import button, main_button, paragraph
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
-from handcal_gui.widgets.result_rows import eyes_text, fine_tuned_texts
 from handcal_gui.widgets.sentence import sentence
-from handcal_gui.widgets.session_rows import RESUME_HELP
-from handcal_gui.widgets.times import local_time
+from handcal_gui.widgets.session_rows import RESUME_HELP, session_facts
 
 _EXPORT = tr("Look at the result, then export it, or resume the session to add to it.")
 _RESUME = tr("Resume the session to make its first alignment.")
@@ -106,8 +101,7 @@ class ReviewPage(QWidget):
         self._card.setVisible(results is not None)
         while self._facts.rowCount():
             self._facts.removeRow(0)
-        tuned = list(fine_tuned_texts(results, record)) if results else []
-        for name, caption, fact in _facts(record, tuned, note):
+        for name, (caption, fact) in _facts(record, note).items():
             text = paragraph(f"review{name}", fact)
             text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
             self._facts.addRow(QLabel(caption, alignment=Qt.AlignmentFlag.AlignTop), text)
@@ -117,12 +111,8 @@ class ReviewPage(QWidget):
         self._title.setText(wearer or tr("Session without a name"))
 
 
-def _facts(
-    record: SessionRecord, tuned: Sequence[Eye], note: str
-) -> Iterator[tuple[str, str, str]]:
-    """Yield the name, the caption and the text of each fact about a session."""
-    yield "Started", tr("Started"), local_time(record.events[0].time)
-    yield "Rig", tr("Rig"), record.rig.name
+def _facts(record: SessionRecord, note: str) -> dict[str, tuple[str, str]]:
+    """Return the caption and the text of each fact about a session, by its name."""
     state = tr("finished") if record.is_finished else tr("not finished")
     alignments, verified = len(record.alignments), len(record.facts.verified)
     counts = (
@@ -131,14 +121,14 @@ def _facts(
         else pluralize(alignments, tr("alignment"), tr("alignments")),
         pluralize(len(record.trials), tr("trial"), tr("trials")),
     )
-    by_hand = (tr("{} fine-tuned").format(eyes_text(tuned).lower()),) if tuned else ()
-    back = (tr("with another φ after going back"),) if record.went_back else ()
-    yield "Contents", tr("Contents"), f"{', '.join((*counts, *by_hand, *back))}; {state}"
-    yield "Folder", tr("Folder"), str(record.path)
+    facts = {name: (name, fact) for name, fact in session_facts(record).items()}
+    facts["Contents"] = tr("Contents"), f"{', '.join(counts)}; {state}"
+    facts["Folder"] = tr("Folder"), str(record.path)
     if note:
-        yield "Note", tr("Note"), note
+        facts["Note"] = tr("Note"), note
     if record.left_out:
         advice = tr("Repair, in All sessions (Ctrl+L), copies what is sound.")
-        yield "Damaged", tr("Damaged"), f"{sentence(record.left_out)}. {advice}"
+        facts["Damaged"] = tr("Damaged"), f"{sentence(record.left_out)}. {advice}"
     if record.torn_bytes:
-        yield "Journal", tr("Journal"), tr("The last line is incomplete, as after a crash.")
+        facts["Journal"] = tr("Journal"), tr("The last line is incomplete, as after a crash.")
+    return facts

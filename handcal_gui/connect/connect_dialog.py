@@ -3,28 +3,45 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from contextlib import suppress
 
-from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import QCheckBox, QDialog, QLabel, QWidget
+from PySide6.QtCore import QRect, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QCheckBox,
+    QDialog,
+    QHeaderView,
+    QLabel,
+    QMessageBox,
+    QSizePolicy,
+    QTableWidget,
+    QTableWidgetItem,
+    QWidget,
+)
 
-from handcal.core.errors import LinkError
+from handcal.core.errors import HandcalError, LinkError
 from handcal.core.progress import Progress
 from handcal.core.types import EYES, Eye, Rig
 from handcal.link.discovery import Announcement
-from handcal.link.invitation import Invitation
-from handcal.link.pairing import OFFER_S
+from handcal.link.invitation import Invitation, qr_matrix
+from handcal.link.pairing import OFFER_S, Pairing, Pairings
 from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import HeadsetServer
 from handcal.station.checks.doctor import Finding, Health
 from handcal.station.checks.headset import headset_problem, headset_state
 from handcal.station.checks.pattern import pattern_state, send_pattern
-from handcal_gui.app.theme import SPACING_PX, number_font, scale_font
+from handcal_gui.app.theme import SPACING_PX, flat_header, number_font, scale_font
 from handcal_gui.app.translation import tr
-from handcal_gui.connect.paired_devices import PairedDevices
-from handcal_gui.connect.qr_code import QrCode
 from handcal_gui.engine.jobs import Job
-from handcal_gui.widgets.fields import button, make_equally_wide, paragraph, with_name
+from handcal_gui.widgets.fields import (
+    button,
+    make_equally_wide,
+    paragraph,
+    plain_message,
+    with_name,
+)
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.result_rows import EYE_NAMES
@@ -274,3 +291,190 @@ def _heading(text: str) -> QLabel:
     label = QLabel(text)
     scale_font(label, 1.1, is_bold=True)
     return label
+
+
+_LEAST_PX = 4
+"""Size of a module in logical pixels at which a headset's camera reads the code at arm's length."""
+
+
+class QrCode(QWidget):
+    """Shows a text as a QR code; empty without one."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("qrCode")
+        self.setAccessibleName(tr("QR code"))
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self._rows: tuple[tuple[bool, ...], ...] = ()
+
+    def show_text(self, text: str) -> None:
+        """Show another text; an empty one shows nothing."""
+        self._rows = qr_matrix(text) if text else ()
+        self.setAccessibleDescription(text)
+        self.update()
+
+    def sizeHint(self) -> QSize:
+        """Return the size at which the code is read well."""
+        side = 33 * _LEAST_PX + 2 * SPACING_PX
+        return QSize(2 * side, 2 * side)
+
+    def minimumSizeHint(self) -> QSize:
+        """Return half of that."""
+        return self.sizeHint() / 2
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        """Draw the modules as squares of whole device pixels."""
+        if not self._rows:
+            return
+        painter = QPainter(self)
+        ratio = self.devicePixelRatioF()
+        painter.scale(1.0 / ratio, 1.0 / ratio)
+        count = len(self._rows)
+        width, height = round(ratio * self.width()), round(ratio * self.height())
+        module = max(1, min(width, height) // count)
+        left, top = (width - count * module) // 2, (height - count * module) // 2
+        painter.fillRect(QRect(left, top, count * module, count * module), Qt.GlobalColor.white)
+        for y, row in enumerate(self._rows):
+            for x, is_dark in enumerate(row):
+                if is_dark:
+                    place = QRect(left + x * module, top + y * module, module, module)
+                    painter.fillRect(place, Qt.GlobalColor.black)
+        painter.end()
+
+
+_NAME, _DEVICE = range(2)
+
+
+class PairedDevices(QWidget):
+    """Shows the paired headsets, the connected one marked, with their names to edit.
+
+    Parameters
+    ----------
+    pairings : Pairings
+
+    Attributes
+    ----------
+    failed : Signal(str)
+        The reason why a change was not made.
+    """
+
+    failed = Signal(str)
+
+    def __init__(self, pairings: Pairings, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._pairings = pairings
+        self._shown: tuple[tuple[Pairing, ...], str] = (), ""
+        self._is_filling = False
+        self._table = QTableWidget(0, 2)
+        self._table.setObjectName("pairedDevices")
+        self._table.setAccessibleName(tr("Paired headsets"))
+        self._table.setHorizontalHeaderLabels([tr("Name"), tr("Device")])
+        self._table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self._table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        self._table.setTabKeyNavigation(False)
+        self._table.setShowGrid(False)
+        self._table.setMinimumHeight(10 * SPACING_PX)
+        self._table.verticalHeader().hide()
+        across = self._table.horizontalHeader()
+        flat_header(across)
+        across.setSectionResizeMode(_NAME, QHeaderView.ResizeMode.Stretch)
+        across.setSectionResizeMode(_DEVICE, QHeaderView.ResizeMode.ResizeToContents)
+        self._empty = paragraph(
+            "noDevices", tr("None yet. Headsets appear here once they are paired.")
+        )
+        self._empty.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self._rename = button("renameDevice", tr("Rena&me"), tr("Rename the chosen headset"))
+        self._revoke = button(
+            "revokeDevice",
+            tr("Re&voke…"),
+            tr("Revoke the chosen headset"),
+            tr("It can then no longer connect"),
+        )
+        self._table.itemChanged.connect(self._take_name)
+        self._table.itemSelectionChanged.connect(self._refresh)
+        self._rename.clicked.connect(self._edit_name)
+        self._revoke.clicked.connect(self._ask_to_revoke)
+        vbox(
+            self._empty,
+            (self._table, 1),
+            hbox(1, self._rename, self._revoke, spacing=SPACING_PX),
+            on=self,
+            margins=0,
+            spacing=SPACING_PX // 2,
+        )
+        self._refresh()
+
+    def show_devices(self, connected_id: str) -> None:
+        """Show the devices paired now, unless a name is being edited; mark the connected one."""
+        if (self._paired(), connected_id) != self._shown and not self._is_editing():
+            self._fill(connected_id)
+
+    def _paired(self) -> tuple[Pairing, ...]:
+        return tuple(one for one in self._pairings.all if one.device_id)
+
+    def _fill(self, connected_id: str) -> None:
+        chosen, devices = self._chosen(), self._paired()
+        self._shown = devices, connected_id
+        self._is_filling = True
+        self._table.setRowCount(len(devices))
+        for row, one in enumerate(devices):
+            name = QTableWidgetItem(one.name or tr("Without a name"))
+            is_connected = one.device_id == connected_id
+            device = QTableWidgetItem(
+                tr("{}, connected").format(one.device_id) if is_connected else one.device_id
+            )
+            device.setFlags(Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable)
+            device.setFont(number_font())
+            self._table.setItem(row, _NAME, name)
+            self._table.setItem(row, _DEVICE, device)
+        self._is_filling = False
+        for row, one in enumerate(devices):
+            if chosen is not None and one.device_id == chosen.device_id:
+                self._table.selectRow(row)
+        self._refresh()
+
+    def _is_editing(self) -> bool:
+        return self._table.state() == QAbstractItemView.State.EditingState
+
+    def _chosen(self) -> Pairing | None:
+        rows = self._table.selectionModel().selectedRows()
+        return self._shown[0][rows[0].row()] if rows else None
+
+    def _edit_name(self) -> None:
+        item = self._table.item(self._table.currentRow(), _NAME)
+        if item is not None:
+            self._table.editItem(item)
+
+    def _take_name(self, item: QTableWidgetItem) -> None:
+        if self._is_filling or item.column() != _NAME:
+            return
+        one = self._shown[0][item.row()]
+        self._change(lambda: self._pairings.rename(one.device_id, item.text().strip()))
+
+    def _ask_to_revoke(self) -> None:
+        one = self._chosen()
+        if one is None:
+            return
+        buttons = QMessageBox.StandardButton
+        question = tr(
+            "Revoke {}? Its session ends, and it connects again only after it has been "
+            "paired again."
+        ).format(one.name or one.device_id)
+        if QMessageBox.question(self, tr("Revoke"), plain_message(question)) == buttons.Yes:
+            self._change(lambda: self._pairings.revoke(one.device_id))
+
+    def _change(self, change: Callable[[], None]) -> None:
+        """Change the pairings, and show what they are then."""
+        try:
+            change()
+        except (HandcalError, ValueError) as error:
+            self.failed.emit(str(error))
+        self._fill(self._shown[1])
+
+    def _refresh(self) -> None:
+        has_devices = bool(self._shown[0])
+        self._table.setVisible(has_devices)
+        self._empty.setVisible(not has_devices)
+        for one in (self._rename, self._revoke):
+            one.setVisible(has_devices)
+            one.setEnabled(self._chosen() is not None)

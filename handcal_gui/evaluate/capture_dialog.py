@@ -20,7 +20,7 @@ from handcal.core.types import UInt8
 from handcal.io.files import user_path
 from handcal.lab.evaluate.cube_capture import RestWatch, instruction, keep_capture
 from handcal.lab.evaluate.cube_folder import GRID, CapturePlan, PlannedCapture, missing_captures
-from handcal.lab.evaluate.run import cube_and_grid, position_warp
+from handcal.lab.evaluate.cube_test import cube_and_grid, position_warp
 from handcal.rig.cube.cube import Cube
 from handcal.rig.displays.grid import Grid
 from handcal.rig.displays.warp import RotationWarp
@@ -28,9 +28,8 @@ from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.app.theme import SPACING_PX, scale_font
 from handcal_gui.app.translation import tr
 from handcal_gui.engine.latest_job import LatestJob
-from handcal_gui.evaluate.capture_list import CaptureList
 from handcal_gui.evaluate.entries import CubeEntries
-from handcal_gui.evaluate.preparation import PreparationDialog
+from handcal_gui.evaluate.evaluation_page import PreparationDialog
 from handcal_gui.widgets.action_strip import one_of_strips
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, main_button, paragraph, whole_number, with_name
@@ -39,6 +38,7 @@ from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.widgets.sentence import sentence
+from handcal_gui.widgets.table import Column, Row, Table
 
 _FIRST_SIZE = QSize(1120, 760)
 _TURNED = tr("Turned to the display's axes")
@@ -86,7 +86,9 @@ class CaptureDialog(PreparationDialog):
         self.form = _plan_form()
         self.form.show_entries(entries)
         self._camera = LiveCameras((tr("Camera"),), open_source=open_source)
-        self._list = CaptureList()
+        self._list = Table("captures", tr("Images to take"), chooses="one")
+        self._list.setMinimumWidth(36 * SPACING_PX)
+        self._missing: frozenset[PlannedCapture] = frozenset()
         self._axes = paragraph("axes")
         self._instruction = paragraph("instruction")
         self._found = FindingLine("capture")
@@ -150,7 +152,7 @@ class CaptureDialog(PreparationDialog):
 
     def take(self) -> None:
         """Keep the present image as the selected capture, if it has the expected content."""
-        images, chosen = self._camera.images, self._list.chosen
+        images, chosen = self._camera.images, self._chosen
         looked_for, watch = self._looked_for, self._watch
         if images is None or chosen is None or looked_for is None or watch is None:
             return
@@ -183,14 +185,14 @@ class CaptureDialog(PreparationDialog):
 
     def _consider(self) -> None:
         """Examine the present image, if captures are taken automatically and none is examined."""
-        images, chosen = self._camera.images, self._list.chosen
+        images, chosen = self._camera.images, self._chosen
         if (
             self._by_itself.isChecked()
             and not self._is_watching
             and not self._bar.is_busy
             and images is not None
             and chosen is not None
-            and not self._list.chosen_is_taken
+            and not self._is_taken_again
         ):
             self._is_watching = True
             self._judge.ask((images[0], chosen, time.monotonic_ns()))
@@ -220,7 +222,7 @@ class CaptureDialog(PreparationDialog):
 
     def _turn_view(self) -> None:
         """Turn the live image as at the position of the selected capture."""
-        chosen = self._list.chosen
+        chosen = self._chosen
         position = "" if chosen is None else chosen.where.split("/")[0]
         if position and position != self._warp[0]:
             self._warp = position, None
@@ -281,13 +283,38 @@ class CaptureDialog(PreparationDialog):
             self._plan, self._plan_problem = self.entries.plan, ""
         except ValueError as error:
             self._plan, self._plan_problem = None, str(error)
-            self._list.show_captures((), ())
+            self._list.show_rows((), ())
         else:
             self._look.ask(self._plan)
 
     def _show_missing(self, plan: CapturePlan, missing: list[PlannedCapture]) -> None:
-        if plan == self._plan:
-            self._list.show_captures(plan.captures, frozenset(missing))
+        """List the captures, and choose the next missing one after the chosen."""
+        if plan != self._plan:
+            return
+        last = plan.captures.index(self._chosen) if self._chosen in plan.captures else -1
+        self._missing = frozenset(missing)
+        states = {True: tr("missing"), False: tr("✓ taken")}
+        rows = [
+            Row("", (f"{one.where}/{one.name}", states[one in self._missing]), key=one)
+            for one in plan.captures
+        ]
+        columns = (Column(title, is_number=False) for title in (tr("Image"), tr("State")))
+        self._list.show_rows(tuple(columns), rows)
+        places = [place for place, one in enumerate(plan.captures) if one in self._missing]
+        following = sorted(places, key=lambda place: (place < last, place))
+        self._list.choose([plan.captures[place] for place in following[:1]])
+        self._refresh()
+
+    @property
+    def _chosen(self) -> PlannedCapture | None:
+        """The image to take next; None if none is listed or none is missing."""
+        chosen: list[PlannedCapture] = self._list.chosen
+        return chosen[0] if chosen else None
+
+    @property
+    def _is_taken_again(self) -> bool:
+        """True if the selected image has been taken and would be replaced."""
+        return self._chosen is not None and self._chosen not in self._missing
 
     def _show_taken(self, taken: PlannedCapture, seen: str) -> None:
         self._found.show_finding(
@@ -315,7 +342,7 @@ class CaptureDialog(PreparationDialog):
 
     def _refresh(self) -> None:
         is_ready = self._looked_for is not None and not self._bar.is_busy
-        is_seen = self._camera.images is not None and self._list.chosen is not None
+        is_seen = self._camera.images is not None and self._chosen is not None
         self._start.setEnabled(self._looked_for is not None)
         self._take.setEnabled(is_ready and is_seen)
         self._mains.setCurrentIndex(int(self._camera.images is not None))
@@ -323,19 +350,19 @@ class CaptureDialog(PreparationDialog):
         self._by_itself.setText(_NOT_BY_ITSELF if are_stored else _BY_ITSELF)
         self._by_itself.setEnabled(not are_stored)
         self._by_itself.setChecked(self._by_itself.isChecked() and not are_stored)
-        self._take.setText(tr("Take again") if self._list.chosen_is_taken else tr("Take"))
+        self._take.setText(tr("Take again") if self._is_taken_again else tr("Take"))
         self._instruction.setText(self._next_instruction())
 
     def _next_instruction(self) -> str:
         if self._plan_problem:
             return f"{sentence(self._plan_problem)}."
-        if self._list.is_complete and self._list.chosen is None:
+        if self._list.keys and not self._missing and self._chosen is None:
             return tr("All captures have been taken.")
-        if self._looked_for is None or self._list.chosen is None:
+        if self._looked_for is None or self._chosen is None:
             return ""
         if self._camera.images is None:
             return tr("Choose the camera, and press Show.")
-        return f"{instruction(self._list.chosen)}."
+        return f"{instruction(self._chosen)}."
 
     def _lay_out(self) -> None:
         scale_font(self._instruction, 1.6, is_bold=True)

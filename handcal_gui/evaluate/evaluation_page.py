@@ -4,26 +4,55 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QDialog, QLabel, QWidget
 
 from handcal.core.errors import HandcalError
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
 from handcal_gui.engine.latest_job import LatestJob
-from handcal_gui.evaluate.preparation import Preparation, PreparationButton
 from handcal_gui.evaluate.results_view import ResultsView
 from handcal_gui.evaluate.work import Evaluation, Outcome, Readiness
 from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.fields import main_button, make_linked, paragraph, with_name
+from handcal_gui.widgets.fields import button, main_button, make_linked, paragraph, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import keep_space, vbox
+
+
+class PreparationDialog(QDialog):
+    """Base of dialogs that prepare the data of an evaluation.
+
+    Attributes
+    ----------
+    entries : object
+        Entries of the evaluation, with the changes made here.
+    """
+
+    entries: Any
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Preparation:
+    """A preparation of an evaluation: its button and its dialog."""
+
+    button: str
+    help_text: str
+    """Text and tooltip of the button."""
+    is_possible: Callable[[Any], bool]
+    """Returns whether the entries suffice to open the dialog."""
+    dialog: Callable[[Any, QWidget], PreparationDialog]
+    """Creates the dialog, given entries and a parent."""
+    name: str = "prepare"
+    """Object name of the button."""
+    request: str = ""
+    """Sentence that asks for what to enter first; shown while the dialog cannot be opened."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,19 +81,24 @@ class EvaluationPage(QWidget):
     spec : EvaluationSpec
     entries : object
         Dataclass with the initial values.
+    read : callable
+        Shows a page of the manual.
 
     Attributes
     ----------
     busy_changed : Signal(bool)
-    manual_wanted : Signal(str)
-        The user wants to read a page of the manual.
     form : EntriesForm
     """
 
     busy_changed = Signal(bool)
-    manual_wanted = Signal(str)
 
-    def __init__(self, spec: EvaluationSpec, entries: Any, parent: QWidget | None = None) -> None:
+    def __init__(
+        self,
+        spec: EvaluationSpec,
+        entries: Any,
+        read: Callable[[str], object] = lambda _page: None,
+        parent: QWidget | None = None,
+    ) -> None:
         super().__init__(parent)
         self._evaluation = spec.evaluation
         self._question_text = spec.question
@@ -76,7 +110,10 @@ class EvaluationPage(QWidget):
         self.form = spec.form()
         self.form.show_entries(entries)
         self._button = main_button("run", tr("Run"))
-        self._preparing = [PreparationButton(one) for one in spec.preparations]
+        self._dialog: PreparationDialog | None = None
+        self._preparing = {
+            button(one.name, one.button, help_text=one.help_text): one for one in spec.preparations
+        }
         self._request = with_name(QLabel(), "preparationRequest")
         # It stands beside the bar for a moment as a job starts, and would widen a small window.
         self._request.setMinimumWidth(1)
@@ -85,11 +122,11 @@ class EvaluationPage(QWidget):
         keep_space(self._found)
         self._results = ResultsView(spec.coming)
         self._look = LatestJob(self._check, self)
-        self._lay_out(spec)
+        self._lay_out(spec, read)
         self.form.changed.connect(self._on_entries_changed)
         self._button.clicked.connect(self.run)
-        for prepare in self._preparing:
-            prepare.closed.connect(self._take_entries)
+        for prepare, preparation in self._preparing.items():
+            prepare.clicked.connect(partial(self._prepare, preparation))
         self._bar.failed.connect(self._show_failure)
         self._bar.cancelled.connect(self._note_cancelled)
         self._bar.busy_changed.connect(self._change_busy)
@@ -128,8 +165,8 @@ class EvaluationPage(QWidget):
 
     def stop(self) -> None:
         """Cancel the evaluation or its preparation, and wait for the end."""
-        for prepare in self._preparing:
-            prepare.stop()
+        if self._dialog is not None:
+            self._dialog.reject()
         self._bar.stop()
         self._look.stop()
 
@@ -142,6 +179,18 @@ class EvaluationPage(QWidget):
         """Check the folder again."""
         super().showEvent(event)
         self._ask()
+
+    def _prepare(self, preparation: Preparation) -> None:
+        """Open the dialog of a preparation, and take the entries with which it is closed."""
+        self._dialog = dialog = preparation.dialog(self._entries, self)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.finished.connect(self._end_preparing)
+        dialog.open()
+
+    def _end_preparing(self) -> None:
+        assert self._dialog is not None
+        dialog, self._dialog = self._dialog, None
+        self._take_entries(dialog.entries)
 
     def _on_entries_changed(self) -> None:
         self._results.show_outcome(None)
@@ -189,10 +238,12 @@ class EvaluationPage(QWidget):
 
     def _refresh(self) -> None:
         readiness = self._readiness
-        for prepare in self._preparing:
-            prepare.follow(None if self.is_busy else self._entries)
-        requests = (prepare.request(self._entries) for prepare in self._preparing)
-        self._request.setText(" ".join(filter(None, requests)))
+        requests = []
+        for prepare, preparation in self._preparing.items():
+            is_possible = preparation.is_possible(self._entries)
+            prepare.setEnabled(is_possible and not self.is_busy)
+            requests += [] if is_possible else [preparation.request]
+        self._request.setText(" ".join(requests))
         self._request.setVisible(bool(self._request.text()) and not self.is_busy)
         is_shown = readiness is not None and readiness.is_done and not self._results.is_empty
         can_run = readiness is not None and readiness.can_run and not self._waits_for
@@ -230,9 +281,9 @@ class EvaluationPage(QWidget):
             return replace(finding, found=tr("Cancelled; the next run starts from the beginning"))
         return replace(finding, found=tr("Cancelled; {}").format(finding.found))
 
-    def _lay_out(self, spec: EvaluationSpec) -> None:
+    def _lay_out(self, spec: EvaluationSpec, read: Callable[[str], object]) -> None:
         note = make_linked(paragraph("format", spec.note))
-        note.linkActivated.connect(self.manual_wanted)
+        note.linkActivated.connect(read)
         note.setVisible(bool(spec.note))
         vbox(
             self._question,

@@ -9,9 +9,10 @@ from PySide6.QtWidgets import QLineEdit, QSpinBox, QWidget
 
 from handcal.io.files import user_path
 from handcal.lab.evaluate.cube_folder import find_captures
+from handcal.lab.evaluate.cube_test import run_cube_test
 from handcal.lab.evaluate.masked_frames import read_masked_names
-from handcal.lab.evaluate.run import run_cube_test, run_segmentation_test, run_user_test
-from handcal.lab.evaluate.user_test import holds_trials
+from handcal.lab.evaluate.segmentation import run_segmentation_test
+from handcal.lab.evaluate.user_test import holds_trials, run_user_test
 from handcal.lab.settings import SegmentationTestSettings
 from handcal.lab.study.studies import (
     method_cases,
@@ -24,8 +25,7 @@ from handcal.session.record import replay
 from handcal_gui.app.translation import tr
 from handcal_gui.evaluate.capture_dialog import MOST_POSES, CaptureDialog
 from handcal_gui.evaluate.entries import CubeEntries, UserEntries
-from handcal_gui.evaluate.evaluation_page import EvaluationSpec
-from handcal_gui.evaluate.preparation import Preparation
+from handcal_gui.evaluate.evaluation_page import EvaluationSpec, Preparation
 from handcal_gui.evaluate.track_dialog import TrackDialog
 from handcal_gui.evaluate.trials_dialog import TrialsDialog
 from handcal_gui.evaluate.work import FileEvaluation, StudyEvaluation
@@ -44,8 +44,8 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
             tr("Noise study"),
             tr(
                 "How much rotation and noise do the solvers tolerate before their error exceeds "
-                "the 4 mm of Hu et al. 2021? About ten minutes on two cores; half a minute for a "
-                "quick run."
+                "the 4 mm of Hu et al. 2021? About a quarter of an hour on two cores; half a "
+                "minute for a quick run."
             ),
             StudyEvaluation(noise_cases, run_noise_study),
             _noise_form,

@@ -27,7 +27,7 @@ from handcal_gui.app.theme import SPACING_PX, colors
 from handcal_gui.app.translation import tr
 from handcal_gui.evaluate.devices import depth_camera, paired_headset, pairing_problem
 from handcal_gui.evaluate.entries import CubeEntries
-from handcal_gui.evaluate.preparation import PreparationDialog
+from handcal_gui.evaluate.evaluation_page import PreparationDialog
 from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, choice, main_button, one_of

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -39,23 +39,23 @@ class EvaluationWindow(QDialog):
         By field of the entries.
     entries : EvaluationEntries
         Initial settings.
+    read : callable
+        Shows a page of the manual.
 
     Attributes
     ----------
     remembered : Signal(EvaluationEntries)
         The settings as entered, to be proposed next time.
-    manual_wanted : Signal(str)
-        The user wants to read a page of the manual.
     """
 
     remembered = Signal(object)
-    manual_wanted = Signal(str)
 
     def __init__(
         self,
         specs: Mapping[str, EvaluationSpec],
         entries: EvaluationEntries,
         parent: QWidget | None = None,
+        read: Callable[[str], object] = lambda _page: None,
     ) -> None:
         super().__init__(parent)
         self.setObjectName("evaluationWindow")
@@ -70,9 +70,8 @@ class EvaluationWindow(QDialog):
         self._stack = QStackedWidget()
         self._pages: dict[str, EvaluationPage] = {}
         for name, spec in specs.items():
-            page = EvaluationPage(spec, getattr(entries, name))
+            page = EvaluationPage(spec, getattr(entries, name), read)
             page.busy_changed.connect(partial(self._change_busy, name))
-            page.manual_wanted.connect(self.manual_wanted)
             self._stack.addWidget(page)
             item = QListWidgetItem(spec.title)
             item.setSizeHint(QSize(0, 4 * SPACING_PX))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +22,8 @@ from handcal.lab.study.studies import STUDY_SHARE
 from handcal.report.document import Report
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.app.translation import tr
-from handcal_gui.evaluate.time_left import TimeLeft
+
+_MINUTE_S = 60.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,13 +103,15 @@ class StudyEvaluation:
     def run(self, entries: Any, progress: Progress) -> Outcome:
         """Run or resume the study, and report its progress with the remaining time."""
         study, folder = self.study(entries), output_folder(entries.output)
-        count = len(study.cases)
-        left = TimeLeft(share_done(study, folder))
+        count, begun, start_s = len(study.cases), share_done(study, folder), time.monotonic()
 
         def report(doing: str, share: float) -> None:
             if doing == RUNNING:
                 done = share / STUDY_SHARE
-                parts = tr("{:,} of {:,} cases").format(round(done * count), count), left.at(done)
+                parts = (
+                    tr("{:,} of {:,} cases").format(round(done * count), count),
+                    time_left(time.monotonic() - start_s, done, begun),
+                )
                 doing = ", ".join(filter(None, parts))
             progress.report(doing, share)
 
@@ -137,6 +141,26 @@ class FileEvaluation:
     def run(self, entries: Any, progress: Progress) -> Outcome:
         """Evaluate the files and write the report."""
         return _outcome(output_folder(entries.output), self.order(entries, progress))
+
+
+def time_left(elapsed_s: float, share: float, begun: float = 0.0) -> str:
+    """Return the remaining time in words; empty until more is done than when it began.
+
+    Parameters
+    ----------
+    elapsed_s : float
+    share, begun : float
+        Share that is done now, and that was at the beginning.
+    """
+    if share <= begun:
+        return ""
+    left_s = elapsed_s * (1.0 - share) / (share - begun)
+    if left_s < _MINUTE_S:
+        return tr("less than a minute left")
+    hours, minutes = divmod(round(left_s / _MINUTE_S), 60)
+    if hours:
+        return tr("about {} h {} min left").format(hours, minutes)
+    return tr("about {} min left").format(minutes)
 
 
 def _outcome(folder: Path, reported: HasReport) -> Outcome:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction, QShowEvent
 from PySide6.QtWidgets import (
@@ -20,6 +21,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from handcal.core.types import EYES, Eye
 from handcal.session.library import LibraryEntry
 from handcal.session.state import MAX_WEARER_CHARACTERS
 from handcal_gui.app.keys import add_action
@@ -27,23 +29,28 @@ from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
 from handcal_gui.engine.jobs import Work
 from handcal_gui.engine.latest_job import LatestJob
-from handcal_gui.library.sessions_model import FILTERS, SessionsModel, is_damaged
-from handcal_gui.library.sessions_table import SessionsTable
-from handcal_gui.library.tasks import (
+from handcal_gui.library.sessions import (
+    COLUMNS,
+    FILTERS,
     Change,
     Contents,
+    calibrations_of,
     check_sessions,
     correct_names,
     delete_sessions,
+    is_damaged,
+    is_of,
+    matches,
     read_contents,
     repair_beside,
+    selection_text,
+    session_row,
     undo,
     undoable,
 )
-from handcal_gui.library.trend_plot import TrendPlot, calibrations_of, trend_text
 from handcal_gui.widgets.brief import copy_text, limit_length
 from handcal_gui.widgets.elided_label import ElidedLabel
-from handcal_gui.widgets.error_bars import LIBRARY_LEGEND, PICTURE_HELP, has_bars
+from handcal_gui.widgets.error_bars import LIBRARY_LEGEND, PICTURE_HELP, PICTURE_PX, has_bars
 from handcal_gui.widgets.fields import (
     button,
     choice,
@@ -57,12 +64,16 @@ from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, keep_space, vbox
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.opening import open_path
-from handcal_gui.widgets.result_rows import NOTHING
+from handcal_gui.widgets.plots import Plot
+from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING
 from handcal_gui.widgets.session_rows import RESUME_HELP
+from handcal_gui.widgets.table import Table
 
 _TASK = tr(
     "Select a session and open it, or several, with Ctrl or Shift, to export, check or delete them."
 )
+_MOST_TICKS = 20
+_SYMBOLS: dict[Eye, str] = {"left": "o", "right": "t1"}
 
 
 class LibraryWindow(QDialog):
@@ -97,12 +108,16 @@ class LibraryWindow(QDialog):
         self._changes: list[Change] = [()]
         self._found_damaged: set[Path] = set()  # by the last check, which reads more
         self._is_read = False
-        self._sessions = SessionsModel()
         self._search = with_name(QLineEdit(clearButtonEnabled=True), "search", tr("Search"))
-        self._search.setPlaceholderText(tr("Search wearer, date, rig, headset (Ctrl+F)"))
+        self._search.setPlaceholderText(tr("Search wearer, date, notes, rig (Ctrl+F)"))
         self._kind = choice("kind", tr("Sessions shown"), FILTERS)
-        self._table = SessionsTable(self._sessions)
+        self._table = Table("sessionTable", tr("Sessions"), chooses="several", is_sorted=True)
+        self._table.setIconSize(PICTURE_PX)
+        self._table.setMinimumHeight(12 * SPACING_PX)
+        self._table.sortByColumn(1, Qt.SortOrder.DescendingOrder)
         self._legend = with_name(QLabel(LIBRARY_LEGEND), "legend", help_text=PICTURE_HELP)
+        self._left_out = with_name(ElidedLabel(), "leftOut")
+        self._means = paragraph("means")
         self._count = paragraph("count", tr("Reading {}…").format(folder))
         self._trend = TrendPlot()
         self._trend.setMinimumHeight(20 * SPACING_PX)
@@ -122,7 +137,8 @@ class LibraryWindow(QDialog):
         self._find.failed.connect(self._say)
         self._search.textChanged.connect(self._search_again)
         self._kind.currentIndexChanged.connect(self._search_again)
-        self._table.selectionModel().selectionChanged.connect(self._refresh)
+        self._table.chosen_changed.connect(self._refresh)
+        self._table.hidden_changed.connect(self._show_left_out)
         self._table.doubleClicked.connect(self._open.trigger)
         self.finished.connect(self.stop)
         self._show_busy(False)
@@ -130,12 +146,12 @@ class LibraryWindow(QDialog):
     @property
     def chosen(self) -> list[LibraryEntry]:
         """The sessions that are selected, in the order shown."""
-        return self._table.chosen
+        by_path = {entry.path: entry for entry in self._contents.entries}
+        return [by_path[path] for path in self._table.chosen]
 
     def reload(self, checked: Collection[Path] = ()) -> None:
         """Read the folder again; sessions that have not changed only if they were just checked."""
-        rows = self._sessions.rows
-        self._find.ask([row.entry for row in rows if row.entry.path not in checked])
+        self._find.ask([one for one in self._contents.entries if one.path not in checked])
 
     def stop(self) -> None:
         """Cancel what is running; safe to call twice."""
@@ -152,24 +168,28 @@ class LibraryWindow(QDialog):
         before, self._contents = self._contents, contents
         if self._is_read:  # those that were deleted together are restored together
             self._changes.append(tuple(p for p in contents.deleted if p not in before.deleted))
-        self._changes = undoable(self._changes, contents) or [contents.deleted[-1:]]
-        shown = {row.entry.path for row in before.rows}
-        made = {row.entry.path for row in contents.rows} - shown if self._is_read else set()
+        self._changes = undoable(self._changes, contents) or [contents.together]
+        shown = {entry.path for entry in before.entries}
+        made = {entry.path for entry in contents.entries} - shown if self._is_read else set()
         self._is_read = True
-        self._legend.setVisible(any(has_bars(row.entry.eyes) for row in contents.rows))
-        if contents.rows != before.rows:
-            self._sessions.show_rows(contents.rows)
-            self._table.fit_columns()
+        self._legend.setVisible(any(has_bars(entry.eyes) for entry in contents.entries))
+        if contents.entries != before.entries:
+            self._show_rows()
         if made:  # a copy, or what was restored
             self._table.choose(made)
         self._refresh()
+
+    def _show_rows(self) -> None:
+        words, kind = self._search.text().casefold().split(), self._kind.currentData()
+        entries = [e for e in self._contents.entries if is_of(e, kind) and matches(e, words)]
+        self._table.show_rows(COLUMNS, [session_row(entry) for entry in entries])
 
     def _begin_search(self) -> None:
         self._search.setFocus(Qt.FocusReason.ShortcutFocusReason)
         self._search.selectAll()
 
     def _search_again(self) -> None:
-        self._sessions.search(self._search.text(), self._kind.currentData())
+        self._show_rows()
         self._refresh()
 
     def _refresh(self) -> None:
@@ -187,15 +207,45 @@ class LibraryWindow(QDialog):
         self._repair.setEnabled(is_free and len(chosen) == len(damaged) == 1)
         self._delete.setEnabled(is_free and bool(chosen))
         self._refresh_undo()
-        shown, total = len(self._sessions.shown), len(self._sessions.rows)
+        if self._is_read:
+            self._show_counts(len(chosen))
+        self._means.setText(selection_text(chosen))
+        self._show_left_out()
+        self._show_trend(chosen[0].wearer if chosen else "")
+
+    def _show_counts(self, chosen: int) -> None:
+        """Show how many sessions there are, or why none is shown, and what to do."""
+        entries = self._contents.entries
+        empty = sum(entry.is_empty for entry in entries)
+        shown, total = len(self._table.keys), len(entries) - empty
         count = pluralize(total, tr("session"), tr("sessions"))
         if shown != total:
             count = tr("{} of {} sessions").format(shown, total)
-        selected = tr(", {} selected").format(len(chosen)) if chosen else ""
-        if self._is_read:
-            self._table.show_reason(self._contents.is_missing)
-            self._count.setText(tr("{} in {}{}").format(count, self._folder, selected))
-        self._show_trend(chosen[0].wearer if chosen else "")
+        selected = tr(", {} selected").format(chosen) if chosen else ""
+        left_out = tr("; not shown: {} empty").format(empty) if empty else ""
+        self._count.setText(tr("{} in {}{}{}").format(count, self._folder, selected, left_out))
+        hint = tr("No session matches. Search for something else, or choose All sessions.")
+        if self._contents.is_missing:
+            hint = tr(
+                "This folder does not exist. Calibrate a wearer, which creates it, or choose "
+                "another session folder on the start page."
+            )
+        elif not entries:
+            hint = tr(
+                "No session is in this folder yet. Calibrate a wearer, or choose another session "
+                "folder on the start page."
+            )
+        self._table.show_hint(hint)
+
+    def _show_left_out(self) -> None:
+        """Show the values of a single selected session that have no column, or their names."""
+        hidden, chosen = self._table.hidden, self._table.chosen
+        titles = [title.split("\n")[0] for title in hidden]
+        text = tr("A wider window also shows: {}").format(", ".join(titles)) if hidden else ""
+        if len(chosen) == 1:
+            values = (texts[chosen[0]] for texts in hidden.values())
+            text = "; ".join(map("{}: {}".format, titles, values))
+        self._left_out.setText(text)
 
     def _refresh_undo(self) -> None:
         """Offer to undo the last change made in this window, else the last deletion."""
@@ -216,11 +266,14 @@ class LibraryWindow(QDialog):
         self._change_text.setVisible(bool(text))  # or it halves the line of the count
 
     def _show_trend(self, wearer: str) -> None:
-        found = calibrations_of(wearer, [row.entry for row in self._sessions.rows])
+        found = calibrations_of(wearer, self._contents.entries)
         self._trend.setVisible(len(found) > 1)
         text = tr("Select a wearer with several calibrations to see how the errors changed.")
         if len(found) > 1:
-            text = trend_text(wearer, len(found))
+            text = tr(
+                "{}: {} calibrations, and the error expected after each, verified by the wearer or "
+                "not"
+            ).format(wearer, len(found))
             self._trend.show_calibrations(found)
         self._trend_title.setText(text)
 
@@ -248,7 +301,7 @@ class LibraryWindow(QDialog):
     def _ask_name(self) -> None:
         """Let the user correct the name of the chosen sessions' wearer."""
         chosen = [entry for entry in self.chosen if not entry.problem]
-        known = {row.entry.wearer for row in self._sessions.rows} - {""}
+        known = {entry.wearer for entry in self._contents.entries} - {""}
         former = [name for entry in chosen for name in entry.former_wearers]
         names = dict.fromkeys([chosen[0].wearer, *former, *sorted(known, key=str.casefold)])
         dialog = QInputDialog(self)
@@ -351,8 +404,8 @@ class LibraryWindow(QDialog):
         self._change_text = ElidedLabel()
         self._change_text.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         below = QWidget()
-        title = hbox((self._trend_title, 1), self._table.left_out, spacing=SPACING_PX)
-        vbox(title, (self._trend, 1), on=below, margins=0, spacing=0)
+        parts = self._left_out, self._trend_title, (self._trend, 1)
+        vbox(*parts, on=below, margins=0, spacing=SPACING_PX // 2)
         halves = QSplitter(Qt.Orientation.Vertical)
         halves.addWidget(self._table)
         halves.addWidget(below)
@@ -380,6 +433,7 @@ class LibraryWindow(QDialog):
             paragraph("libraryTask", _TASK),
             hbox((self._search, 1), shown, self._kind, self._legend, spacing=SPACING_PX),
             (halves, 1),
+            self._means,
             hbox((self._count, 1), (self._change_text, 1), self._undo, spacing=SPACING_PX),
             self._said,
             hbox(close, 1, *buttons, opening, spacing=SPACING_PX),
@@ -398,3 +452,58 @@ def _pressed_for(action: QAction, made: QPushButton) -> QPushButton:
     made.clicked.connect(action.trigger)
     action.enabledChanged.connect(made.setEnabled)
     return made
+
+
+class TrendPlot(Plot):
+    """Shows the expected errors: filled symbols after a verification, hollow ones without it."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(
+            "trend",
+            tr("Trend"),
+            tr("Calibration of this wearer, oldest first"),
+            tr("Expected error (′)"),
+            parent,
+        )
+        self.show_legend()
+        self._target = self.add_line("muted", name=tr("Target"), dashed=True)
+        self._verified = {
+            eye: self.add_line(
+                eye, name=tr("{}, verified").format(EYE_NAMES[eye]), symbol=_SYMBOLS[eye]
+            )
+            for eye in EYES
+        }
+        self._unverified = {
+            eye: self.add_line(
+                eye,
+                name=tr("{}, not verified").format(EYE_NAMES[eye]),
+                dashed=True,
+                symbol=_SYMBOLS[eye],
+            )
+            for eye in EYES
+        }
+
+    def show_calibrations(self, entries: Sequence[LibraryEntry]) -> None:
+        """Show the solved sessions of one wearer, the oldest first, and the newest target."""
+        numbers, count = np.arange(1.0, len(entries) + 1.0), max(len(entries), 2)
+        targets = [one.target_arcmin for one in entries if one.target_arcmin is not None][-1:]
+        largest = max(1.0, *targets, 0.0)
+        self._target.setData([0.8, count + 0.2][: 2 * len(targets)], 2 * targets)
+        for eye in EYES:
+            outcomes = [entry.eyes.get(eye) for entry in entries]
+            verified = [None if one is None else one.remaining_arcmin for one in outcomes]
+            unverified = [
+                None if one is None or one.remaining_arcmin is not None else one.expected_arcmin
+                for one in outcomes
+            ]
+            for line, errors in ((self._verified, verified), (self._unverified, unverified)):
+                known = [np.nan if error is None else error for error in errors]
+                largest = max(largest, *(error or 0.0 for error in errors))
+                if any(error is not None for error in errors):
+                    line[eye].setData(numbers, np.array(known, dtype=np.float64))
+                else:
+                    line[eye].clear()
+        self.item.setYRange(0.0, 1.1 * largest, padding=0.0)
+        self.item.setXRange(0.8, count + 0.2)
+        ticks = [[(number, f"{number:g}") for number in numbers]]
+        self.item.getAxis("bottom").setTicks(ticks if len(entries) <= _MOST_TICKS else None)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 
 from PySide6.QtWidgets import QWidget
@@ -12,6 +11,7 @@ from handcal.core.errors import FileError, HandcalError
 from handcal.core.types import Eye
 from handcal.io.images import write_png
 from handcal.rig.assemble import screen_of
+from handcal.rig.boards.board import Board
 from handcal.rig.boards.choose import ALIKE
 from handcal.rig.displays.grid import Grid, draw_grid, grid_on
 from handcal.rig.steps import ASKED_BOARDS, ASKED_GRIDS, view_in
@@ -20,7 +20,7 @@ from handcal_gui.app.translation import tr
 from handcal_gui.rig.file_dialogs import ask_save
 from handcal_gui.rig.images_panel import ImagesPanel
 from handcal_gui.rig.project import RigProject
-from handcal_gui.rig.project_folder import DisplayEntries, Distance
+from handcal_gui.rig.project_folder import Distance
 from handcal_gui.rig.solve import CAMERA_MISSING, SolvedPart, solve_display
 from handcal_gui.rig.step_page import StepPage, images_needed
 from handcal_gui.widgets.entries_form import EntriesForm
@@ -142,11 +142,14 @@ class DisplayPage(StepPage):
                 "nominal_m": (tr("Nominal &distance"), nominal),
             }
         )
-        form.show_entries(project.inputs.left if eye == "left" else project.inputs.right)
-        keys = tr("&Take images…"), tr("Find the grid &again")
-        grid = ImagesPanel(project, (tr("Viewpoint camera"),), _GRID_HINT, "setup-display", *keys)
-        keys = tr("Ta&ke images…"), tr("Find t&he board again")
-        board = ImagesPanel(project, (tr("Viewpoint camera"),), _BOARD_HINT, "setup-board", *keys)
+        camera = (tr("Viewpoint camera"),)
+        of_grid = ("grid_images",), "dropped_grid", tr("&Take images…"), tr("Find the grid &again")
+        grid = ImagesPanel(project, camera, _GRID_HINT, "setup-display", *of_grid)
+        of_board = (
+            *(("board_images",), "dropped_board"),
+            *(tr("Ta&ke images…"), tr("Find t&he board again")),
+        )
+        board = ImagesPanel(project, camera, _BOARD_HINT, "setup-board", *of_board)
         panels = {tr("Grid on the displa&y"): grid, tr("Ca&mera pose"): board}
         super().__init__(f"{eye}DisplayPage", eye, project, form, panels, parent)
         make_linked(board.hint).linkActivated.connect(read)
@@ -162,31 +165,19 @@ class DisplayPage(StepPage):
         self._board.take.clicked.connect(self._take_board)
         self.show_known()
 
-    @property
-    def _entries(self) -> DisplayEntries:
-        work = self.project.inputs
-        return work.left if self._eye == "left" else work.right
+    def board_of(self, panel: ImagesPanel) -> Board | None:
+        """Return the grid on the display, or the entered board."""
+        if panel is self._board:
+            return super().board_of(panel)
+        grid = self._shown()
+        return None if grid is None else grid.board
 
     def enter(self) -> None:
         """Search the folders for grid and board, unless already done."""
-        entries = self._entries
         for distance, fields in self._by_distance.items():
             for field in fields:
-                field.setEnabled(distance == entries.distance)
-        self._board.look((entries.board_images,), self.project.inputs.board, entries.dropped_board)
-        if (grid := self._shown()) is not None:
-            self._grid.look((entries.grid_images,), grid.board, entries.dropped_grid)
-
-    def keep(self) -> None:
-        """Store the entries, and search new folders for grid and board."""
-        entries = self.form.take(self._entries)
-        entries = replace(
-            entries,
-            dropped_grid=self._grid.dropped_of(entries.dropped_grid),
-            dropped_board=self._board.dropped_of(entries.dropped_board),
-        )
-        self.project.enter(**{self._eye: entries})
-        self.enter()
+                field.setEnabled(distance == self.entries.distance)
+        super().enter()
 
     def solve(self) -> None:
         """Solve from the images that are not excluded."""
@@ -194,7 +185,7 @@ class DisplayPage(StepPage):
             solve_display,
             self._grid.shots,
             self._board.shots,
-            self._entries,
+            self.entries,
             self._eye,
             self.project.rig,
             self.project.camera_file,
@@ -215,9 +206,9 @@ class DisplayPage(StepPage):
             "to solve, choose the file of the poses of the board in Inputs, or a stereo calibration"
         )
         need = images_needed(self._grid, grid)
-        if need or self._entries.stereo:
+        if need or self.entries.stereo:
             return need
-        return images_needed(self._board, board) or ("" if self._entries.tracked else poses)
+        return images_needed(self._board, board) or ("" if self.entries.tracked else poses)
 
     def _show_solved(self, solved: tuple[SolvedPart, SolvedPart]) -> None:
         display, place = solved
@@ -230,7 +221,7 @@ class DisplayPage(StepPage):
         """Return the grid for the display; if it does not fit, show why and return None."""
         screen = screen_of(self.project.rig, self._eye)
         try:
-            return grid_on(screen.width_px, screen.height_px, self._entries.square_px)
+            return grid_on(screen.width_px, screen.height_px, self.entries.square_px)
         except HandcalError as error:
             self._grid.look(("",), self.project.inputs.board, ())
             self._grid.show_trouble(str(error))

@@ -2,32 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QLabel, QPushButton, QSplitter, QWidget
+import numpy as np
+from PySide6.QtCore import QPointF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QIcon, QImage, QPainter, QPen, QPixmap
+from PySide6.QtWidgets import (
+    QHeaderView,
+    QLabel,
+    QPushButton,
+    QSplitter,
+    QTreeWidget,
+    QTreeWidgetItem,
+    QWidget,
+)
 
+from handcal.core.errors import FileError
 from handcal.core.progress import Progress
+from handcal.core.types import UInt8
 from handcal.io.files import user_path
-from handcal.rig.boards.board import Board
-from handcal.rig.boards.views import coverage
+from handcal.rig.boards.board import Board, BoardView
+from handcal.rig.boards.views import BoardImage, coverage
 from handcal.station.checks.doctor import Finding, Health
-from handcal_gui.app.theme import SPACING_PX
+from handcal_gui.app.theme import SPACING_PX, colors, flat_header, follow_theme, icon, number_font
 from handcal_gui.app.translation import tr
-from handcal_gui.rig.coverage_map import CoverageMap
+from handcal_gui.engine.latest_job import LatestJob
+from handcal_gui.rig.maps import CoverageMap, UncertaintyMap
 from handcal_gui.rig.project import RigProject
-from handcal_gui.rig.shot_list import ShotList
-from handcal_gui.rig.shot_view import ShotView
-from handcal_gui.rig.shots import Shot, look, other_board
+from handcal_gui.rig.shots import Shot, look, other_board, read_color
 from handcal_gui.rig.solve import SolvedPart
-from handcal_gui.rig.uncertainty_map import UncertaintyMap
 from handcal_gui.widgets.drawing import Drawing
 from handcal_gui.widgets.fields import button, choice, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
+from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.number_label import UNKNOWN
+from handcal_gui.widgets.sentence import sentence
 
 
 class ImagesPanel(QWidget):
@@ -36,13 +49,16 @@ class ImagesPanel(QWidget):
     Parameters
     ----------
     project : RigProject
-        Is told of the board if it is found, and takes another that the images show.
+        Learns that its board was found, and takes another that the images show.
     titles : sequence of str
         Name of the camera, or names of the two cameras of pairs.
     hint : str
         How to take the images.
     drawing : str
         Name of the drawing of the arrangement in the tutorial.
+    folders : sequence of str
+    dropped : str
+        Fields of the step's entries: folders of the images, and the excluded ones.
     take, again : str
         Texts of the buttons, so that two panels of a page can have different keys.
 
@@ -50,6 +66,8 @@ class ImagesPanel(QWidget):
     ----------
     hint, drawing, buttons, search : QWidget
         How to take the images, and how their search goes on; the page places them.
+    folders, dropped
+        As given.
     take, again : QPushButton
         Connected by the page; once `again` is pressed, `look` reads the folders again.
     shots : tuple of Shot
@@ -65,12 +83,15 @@ class ImagesPanel(QWidget):
         titles: tuple[str, ...],
         hint: str,
         drawing: str,
+        folders: Sequence[str] = (),
+        dropped: str = "dropped",
         take: str = tr("&Take images…"),
         again: str = tr("Find the board &again"),
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
         self._project = project
+        self.folders, self.dropped = tuple(folders), dropped
         self.buttons, self.search = QWidget(), QWidget()
         self.shots: tuple[Shot, ...] = ()
         self._question: tuple[tuple[Path, ...], Board] | None = None
@@ -178,7 +199,7 @@ class ImagesPanel(QWidget):
         self.shots = shots
         self._trouble.hide()
         self._view.show_shot(None)
-        self._list.show_shots(shots, dropped)
+        self._list.show_shots(shots, dropped, tr("another board") if other else "")
         self._refresh()
         self.dropped_changed.emit()
         if self._question is not None and not all(shot.problem for shot in shots):
@@ -243,3 +264,224 @@ def _look(
 ) -> tuple[tuple[Shot, ...], Board | None]:
     shots = look(folders, board, progress)
     return shots, other_board(shots, board)
+
+
+_COLUMNS = {
+    tr("Image"): tr("Unticked images are excluded; tick them to include them again."),
+    tr("Corners"): tr("Number of board corners found in each camera's image."),
+    tr("RMS, px"): tr(
+        "Root mean square distance between detected and expected corners, after solving."
+    ),
+    tr("Tilt"): tr("Angle between the board's normal and the line of sight, after solving."),
+    tr("Note"): tr("Why no board was found, or what is wrong with the worst image."),
+}
+_IMAGE, _CORNERS, _OFF, _TILT, _NOTE = range(5)
+
+
+class ShotList(QTreeWidget):
+    """Lists shots, each with a check box to use or exclude it.
+
+    Attributes
+    ----------
+    chosen : Signal(int)
+        Index of the newly selected shot.
+    dropped_changed : Signal()
+    """
+
+    chosen = Signal(int)
+    dropped_changed = Signal()
+
+    def __init__(self, name: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("shots")
+        self.setAccessibleName(name)
+        self.setRootIsDecorated(False)
+        self.setAlternatingRowColors(True)
+        self.setIconSize(QSize(6 * SPACING_PX, 4 * SPACING_PX))
+        self.setHeaderLabels(list(_COLUMNS))
+        for column, tooltip in enumerate(_COLUMNS.values()):
+            self.headerItem().setToolTip(column, tooltip)
+        flat_header(self.header())
+        self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        self.header().setSectionResizeMode(_NOTE, QHeaderView.ResizeMode.Stretch)
+        self.setMinimumSize(34 * SPACING_PX, 12 * SPACING_PX)
+        self._shots: tuple[Shot, ...] = ()
+        self.currentItemChanged.connect(lambda: self.chosen.emit(self.currentIndex().row()))
+        self.itemChanged.connect(self._on_item_changed)
+        follow_theme(self, self._mark_all)
+
+    @property
+    def dropped(self) -> tuple[str, ...]:
+        """Names of the unticked shots."""
+        unchecked = Qt.CheckState.Unchecked
+        return tuple(
+            shot.name for item, shot in self._rows() if item.checkState(_IMAGE) is unchecked
+        )
+
+    def show_shots(self, shots: Sequence[Shot], dropped: Iterable[str], note: str = "") -> None:
+        """Replace the list; a note stands in place of each problem if it explains all of them."""
+        out = frozenset(dropped)
+        self._shots = tuple(shots)
+        self.blockSignals(True)
+        self.clear()
+        self.addTopLevelItems(
+            [_item(shot, shot.name in out, note or shot.problem) for shot in shots]
+        )
+        self._mark_all()
+        self.blockSignals(False)
+        if (first := self.topLevelItem(0)) is not None:
+            self.setCurrentItem(first)
+
+    def show_results(
+        self,
+        residuals_px: Mapping[str, float],
+        tilts_rad: Mapping[str, float],
+        worst: tuple[str, str] = ("", ""),
+    ) -> None:
+        """Show residual and tilt of each, and mark the worst with the reason."""
+        self.blockSignals(True)
+        for item, shot in self._rows():
+            off, tilt = residuals_px.get(shot.name), tilts_rad.get(shot.name)
+            item.setText(_OFF, UNKNOWN if off is None else f"{off:.2f}")
+            item.setText(_TILT, UNKNOWN if tilt is None else f"{np.degrees(tilt):.0f}°")
+            # Of a pair, the worst is named after one image: "headset camera's of NAME".
+            is_worst = worst[0].endswith(shot.name)
+            _note(item, shot.problem or (tr("worst: {}").format(worst[1]) if is_worst else ""))
+        self.blockSignals(False)
+
+    def sizeHint(self) -> QSize:
+        """Return the size at which there is room for notes."""
+        return QSize(60 * SPACING_PX, super().sizeHint().height())
+
+    def _on_item_changed(self, _item: QTreeWidgetItem, column: int) -> None:
+        if column == _IMAGE:
+            self.dropped_changed.emit()
+
+    def _mark_all(self) -> None:
+        for item, shot in self._rows():
+            if shot.problem:
+                item.setIcon(_NOTE, QIcon(icon("warning").pixmap(2 * SPACING_PX)))
+
+    def _rows(self) -> list[tuple[QTreeWidgetItem, Shot]]:
+        items = (self.topLevelItem(row) for row in range(self.topLevelItemCount()))
+        return [(item, shot) for item, shot in zip(items, self._shots, strict=False) if item]
+
+
+def _item(shot: Shot, is_dropped: bool, note: str) -> QTreeWidgetItem:
+    counts = (str(len(view.found.ids)) if view.found else UNKNOWN for view in shot.views)
+    item = QTreeWidgetItem([shot.name, " · ".join(counts), UNKNOWN, UNKNOWN])
+    checked = Qt.CheckState.Unchecked if is_dropped else Qt.CheckState.Checked
+    item.setCheckState(_IMAGE, checked)
+    item.setToolTip(_IMAGE, shot.name)
+    if shot.small is not None:
+        item.setIcon(_IMAGE, _picture(shot.small))
+    for column in (_CORNERS, _OFF, _TILT):
+        item.setTextAlignment(column, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        item.setFont(column, number_font())
+    _note(item, note)
+    return item
+
+
+def _note(item: QTreeWidgetItem, note: str) -> None:
+    item.setText(_NOTE, sentence(note))
+    item.setToolTip(_NOTE, sentence(note))
+
+
+def _picture(image: UInt8) -> QIcon:
+    height, width = image.shape[:2]
+    shown = QImage(image.data, width, height, 3 * width, QImage.Format.Format_RGB888)
+    return QIcon(QPixmap.fromImage(shown.copy()))
+
+
+_ARM = 0.006  # of a corner's cross, relative to the image's width
+
+
+class ShotView(QWidget):
+    """Shows one image, or the two of a pair, one above the other.
+
+    Parameters
+    ----------
+    titles : sequence of str
+        Camera of each image.
+    """
+
+    def __init__(self, titles: tuple[str, ...], parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._titles = titles
+        self._shot: Shot | None = None
+        self._images = tuple(ImageView(title) for title in titles)
+        # Above the images, as over the maps: on small ones, they would hide what they are about.
+        self._captions = tuple(paragraph("shotCaption") for _ in titles)
+        self._read = LatestJob(_read, self)
+        self._read.answered.connect(self._show_images)
+        parts = zip(self._captions, self._images, strict=True)
+        pairs = [
+            (vbox(caption, (image, 1), spacing=SPACING_PX // 2), 1) for caption, image in parts
+        ]
+        vbox(*pairs, on=self, margins=0, spacing=SPACING_PX)
+        self.setMinimumWidth(30 * SPACING_PX)
+        self.show_shot(None)
+
+    def show_shot(self, shot: Shot | None) -> None:
+        """Load and show a shot; None clears the view."""
+        self._shot = shot
+        if shot is None:
+            self._show_message(tr("The selected image will appear here"))
+        else:
+            self._read.ask(shot.files)
+
+    def stop(self) -> None:
+        """Wait for background work to end."""
+        self._read.stop()
+
+    def _show_images(self, files: tuple[Path, ...], images: tuple[UInt8 | str, ...]) -> None:
+        if self._shot is None or files != self._shot.files:
+            return
+        texts = zip(self._captions, self._titles, strict=True)
+        parts = zip(self._images, texts, self._shot.views, images, strict=True)
+        for shown, (caption, title), view, image in parts:
+            found = view.found
+            shown.show_image(None if isinstance(image, str) else image)
+            shown.show_overlay(None if found is None else partial(_draw_corners, found))
+            shown.show_text(message=image if isinstance(image, str) else "")
+            caption.setText(f"{title}: {_caption(view)}")
+
+    def _show_message(self, message: str) -> None:
+        for caption, shown in zip(self._captions, self._images, strict=True):
+            caption.clear()
+            shown.show_image(None)
+            shown.show_overlay(None)
+            shown.show_text(message=message)
+
+
+def _read(files: tuple[Path, ...]) -> tuple[UInt8 | str, ...]:
+    return tuple(_read_one(file) for file in files)
+
+
+def _read_one(file: Path) -> UInt8 | str:
+    """Return an image, or why it cannot be read: the other of a pair is shown nevertheless."""
+    try:
+        return read_color(file)
+    except FileError as error:
+        return str(error)
+
+
+def _caption(view: BoardImage) -> str:
+    if view.found is None:
+        return view.problem
+    blur_px = view.found.blur_px
+    return tr("{} corners; edges {:.1f} px wide").format(len(view.found.ids), blur_px)
+
+
+def _draw_corners(found: BoardView, painter: QPainter) -> None:
+    """Draw a cross at every corner, and a circle around the board's first."""
+    arm_px = _ARM * found.size[0]
+    for width, color in ((4.0, "#ffffff"), (2.0, colors().red)):
+        pen = QPen(QColor(color), width * painter.device().devicePixelRatio())
+        pen.setCosmetic(True)
+        painter.setPen(pen)
+        for x, y in found.pixels.tolist():
+            painter.drawLine(QPointF(x - arm_px, y), QPointF(x + arm_px, y))
+            painter.drawLine(QPointF(x, y - arm_px), QPointF(x, y + arm_px))
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.drawEllipse(QPointF(*found.pixels[0].tolist()), 2.5 * arm_px, 2.5 * arm_px)

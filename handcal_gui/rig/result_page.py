@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QHideEvent, QIcon
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -72,24 +72,21 @@ class ResultPage(QWidget):
     project : RigProject
     read : callable
         Shows a page of the manual.
-
-    Attributes
-    ----------
-    rig_saved : Signal(Path)
-        Rig file to use for the next calibration.
+    use : callable
+        Takes a rig file for the next calibration.
     """
-
-    rig_saved = Signal(object)
 
     def __init__(
         self,
         project: RigProject,
         read: Callable[[str], object] = lambda _page: None,
+        use: Callable[[Path], object] = lambda _rig: None,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
         self.setObjectName("resultPage")
         self._project = project
+        self._use_rig = use
         self._acceptance: AcceptDialog | None = None
         self._name = with_name(QLineEdit(maxLength=MAX_NAME), "rigName", tr("Name of the rig"))
         self._name_problem = paragraph(
@@ -178,14 +175,12 @@ class ResultPage(QWidget):
         for row, one in enumerate(shown):
             found = _TIME.sub(lambda time: local_time(time[0]), one.found)
             expected = "" if one.is_fine else one.expected
-            for column, text in enumerate((one.what, found, expected)):
-                item = QTableWidgetItem(sentence(text))
-                item.setTextAlignment(Qt.AlignmentFlag.AlignTop)
+            items = [QTableWidgetItem(sentence(text)) for text in (one.what, found, expected)]
+            for column, item in enumerate(items):
                 table.setItem(row, column, item)
             sign, shade, word = _sign(one)
-            item = table.item(row, 0)
-            item.setIcon(icon(sign, getattr(colors(), shade)) if sign else QIcon())
-            item.setData(Qt.ItemDataRole.AccessibleDescriptionRole, word)
+            items[0].setIcon(icon(sign, getattr(colors(), shade)) if sign else QIcon())
+            items[0].setData(Qt.ItemDataRole.AccessibleDescriptionRole, word)
         table.setColumnHidden(_EXPECTED, all(one.is_fine for one in shown))
 
     def _outdated(self) -> list[RigFinding]:
@@ -238,7 +233,7 @@ class ResultPage(QWidget):
 
     def _ask_to_use(self) -> None:
         if (saved := self._project.saved_file) is not None:
-            self.rig_saved.emit(saved)
+            self._use_rig(saved)
             text = tr("the next calibration uses this rig")
             self._end.show_finding(Finding("", Health.GOOD, text))
 

@@ -90,12 +90,17 @@ def lens_rows(result: CameraCalibration, camera: str = "") -> tuple[Row, ...]:
     return tuple(rows)
 
 
-def stereo_rows(result: StereoCalibration) -> tuple[Row, ...]:
-    """Return the depth camera's pose."""
+def stereo_rows(result: StereoCalibration, square_m: float) -> tuple[Row, ...]:
+    """Return the depth camera's pose, which is in proportion to the squares' entered side."""
     spread = f"{np.degrees(result.spread_rad):.2f}°, {1e3 * result.spread_m:.1f} mm"
     return (
         _rms(result.rms_px),
         *_place_rows(result.T_H_D, _sigmas(result.covariance, len(STEREO_PARAMETERS))),
+        Row(
+            tr("If a square is"),
+            (f"{1e3 * square_m:.2f} mm", tr("exactly")),
+            tr("The position is in proportion to the squares' side, which the images do not tell."),
+        ),
         Row(
             tr("Each pair alone"),
             (spread, ""),

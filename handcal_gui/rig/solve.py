@@ -11,6 +11,7 @@ from handcal.core.errors import HandcalError
 from handcal.core.types import Eye, Rig
 from handcal.io.files import write_json
 from handcal.rig.assemble import with_display, with_stereo
+from handcal.rig.boards.board import square_m
 from handcal.rig.boards.views import BoardImage, WorstView
 from handcal.rig.formats import camera_json, read_intrinsics
 from handcal.rig.lens.camera import CameraSettings, calibrate_camera, tilt
@@ -76,7 +77,7 @@ def solve_stereo(shots: Sequence[Shot], entries: StereoEntries) -> SolvedPart:
     )
     return SolvedPart(
         result.verdict,
-        stereo_rows(result),
+        stereo_rows(result, _square_m(pairs)),
         result.residuals_px,
         _tilts([first for first, _ in pairs], result.depth),
         result.worst,
@@ -134,6 +135,11 @@ def solve_display(
         add_to=None if result.verdict.name == "bad" else add_to,
     )
     return solved, of_pose
+
+
+def _square_m(pairs: Sequence[tuple[BoardImage, BoardImage]]) -> float:
+    """Return the side of the board's squares as entered; the pairs were solved, so one is found."""
+    return next(square_m(view.found.points_m) for pair in pairs for view in pair if view.found)
 
 
 def _tilts(views: Sequence[BoardImage], camera: Camera) -> dict[str, float]:

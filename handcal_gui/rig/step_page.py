@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -70,8 +71,10 @@ class StepPage(QWidget):
         self.setObjectName(name)
         self.project = project
         self.step = step
+        self._entries_name = "stereo" if step == "T_H_D" else step
         self.inputs = self.solved_with = project.inputs_of(step)
         self.form = form
+        self.form.show_entries(self.entries)
         self.panels = tuple(panels.values())
         self.box = SolveBox()
         self.main = self.box.button
@@ -94,13 +97,31 @@ class StepPage(QWidget):
         project.rig_changed.connect(self._refresh)
         project.inputs_changed.connect(self._refresh)
 
+    @property
+    def entries(self) -> Any:
+        """The entries of this step."""
+        return getattr(self.project.inputs, self._entries_name)
+
+    def board_of(self, panel: ImagesPanel) -> Board | None:
+        """Return what a panel's images show, the entered board; None if it cannot be shown."""
+        del panel
+        return self.project.inputs.board
+
     def enter(self) -> None:
         """Search the entered folders, unless already done."""
-        raise NotImplementedError
+        for panel in self.panels:
+            if (board := self.board_of(panel)) is not None:
+                folders = [getattr(self.entries, name) for name in panel.folders]
+                panel.look(folders, board, getattr(self.entries, panel.dropped))
 
     def keep(self) -> None:
         """Store the entries, and search new folders for the board."""
-        raise NotImplementedError
+        entries = self.form.take(self.entries)
+        dropped = {
+            one.dropped: one.dropped_of(getattr(entries, one.dropped)) for one in self.panels
+        }
+        self.project.enter(**{self._entries_name: replace(entries, **dropped)})
+        self.enter()
 
     def solve(self) -> None:
         """Solve from the images that are not excluded."""

@@ -23,7 +23,7 @@ from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
 from handcal_gui.engine.latest_job import LatestJob
-from handcal_gui.rig.coverage_map import HEAD_PX, CoverageMap
+from handcal_gui.rig.maps import HEAD_PX, CoverageMap
 from handcal_gui.widgets.action_strip import one_of_strips
 from handcal_gui.widgets.fields import button, main_button, one_of, with_name
 from handcal_gui.widgets.finding_line import FindingLine

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Protocol
 
-from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QGuiApplication, QIcon, QKeyEvent
 from PySide6.QtWidgets import (
     QDialog,
@@ -21,6 +22,7 @@ from handcal.camera.settings import RealSenseSettings
 from handcal_gui.app.theme import SPACING_PX, colors, follow_theme, icon, scale_font
 from handcal_gui.app.translation import tr
 from handcal_gui.rig.board_page import BoardPage
+from handcal_gui.rig.camera_pages import StereoPage, ViewpointPage
 from handcal_gui.rig.display_page import DisplayPage
 from handcal_gui.rig.project import UNREADABLE, RigProject
 from handcal_gui.rig.project_folder import ProjectFolder
@@ -28,8 +30,6 @@ from handcal_gui.rig.result_page import ResultPage
 from handcal_gui.rig.solve_box import SolveBox
 from handcal_gui.rig.step_inputs import STEP_TITLES, Step
 from handcal_gui.rig.step_page import StepPage
-from handcal_gui.rig.stereo_page import StereoPage
-from handcal_gui.rig.viewpoint_page import ViewpointPage
 from handcal_gui.widgets.banner import Banner
 from handcal_gui.widgets.fields import button, paragraph, with_name
 from handcal_gui.widgets.job_bar import may_cancel
@@ -102,17 +102,13 @@ class RigWizard(QDialog):
         Project folder; a later wizard resumes from it.
     realsense : RealSenseSettings, optional
         Settings of a RealSense used to take images.
-    read : callable
-        Shows a page of the manual.
+    read, use : callable
+        Show a page of the manual, and take a rig file for the next calibration.
 
     Attributes
     ----------
-    rig_saved : Signal(Path)
-        Rig file to use for the next calibration.
     project : RigProject
     """
-
-    rig_saved = Signal(object)
 
     def __init__(
         self,
@@ -120,6 +116,7 @@ class RigWizard(QDialog):
         parent: QWidget | None = None,
         realsense: RealSenseSettings | None = None,
         read: Callable[[str], object] = lambda _page: None,
+        use: Callable[[Path], object] = lambda _rig: None,
     ) -> None:
         super().__init__(parent)
         self.setObjectName("rigWizard")
@@ -129,7 +126,7 @@ class RigWizard(QDialog):
         self._rail = with_name(QListWidget(), "rigRail", tr("Steps"))
         self._title, self._purpose = QLabel(), paragraph("rigPurpose")
         self._stack, self._strips = QStackedWidget(), QStackedWidget()
-        result = ResultPage(self.project, read)
+        result = ResultPage(self.project, read, use)
         self._pages: list[RigPage] = []
         for page in (
             BoardPage(self.project),
@@ -157,7 +154,6 @@ class RigWizard(QDialog):
         self.project.rig_changed.connect(self._refresh)
         self.project.inputs_changed.connect(self._refresh)
         self.project.failed.connect(self._banner.show_message)
-        result.rig_saved.connect(self.rig_saved)
         self._banner.show_message(self.project.complaint)
         screen = QGuiApplication.primaryScreen().availableSize()
         self.resize(screen.boundedTo(_FIRST_SIZE))

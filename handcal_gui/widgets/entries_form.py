@@ -1,12 +1,13 @@
-"""A form for the entries of a dataclass."""
+"""Forms of dataclasses: fields bound to their entries by name."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import reduce
 from typing import Any, NamedTuple, TypeVar, cast
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QObject, Signal, SignalInstance
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
     QCheckBox,
@@ -31,6 +32,51 @@ class EntriesForm(QWidget):
     ----------
     fields : mapping of str to (str, QWidget)
         Label and widget of each field of the dataclass.
+    """
+
+    def __init__(
+        self, fields: Mapping[str, tuple[str, QWidget]], parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._fields = {name: field for name, (_, field) in fields.items()}
+        self._bound = Bound(self._fields, parent=self)
+        make_equally_wide(one for one in self._fields.values() if isinstance(one, QSpinBox))
+        form = QFormLayout(self)
+        form.setContentsMargins(0, 0, 0, 0)
+        form.setHorizontalSpacing(SPACING_PX)
+        form.setVerticalSpacing(SPACING_PX // 2)
+        for text, field in fields.values():
+            form.addRow(label_for(field, text), field)
+
+    @property
+    def changed(self) -> SignalInstance:
+        """The signal of another value."""
+        return self._bound.changed
+
+    def show_entries(self, entries: object) -> None:
+        """Show the fields' values."""
+        self._bound.show(entries)
+
+    def enter(self, **values: object) -> None:
+        """Show other values of some fields, as if typed."""
+        for name, value in values.items():
+            kind_of(self._fields[name]).show(self._fields[name], value)
+
+    def take(self, entries: Entries) -> Entries:
+        """Return the entered values."""
+        return self._bound.take(entries)
+
+
+class Bound(QObject):
+    """Fields, wherever they stand, of settings that are nested dataclasses.
+
+    Parameters
+    ----------
+    fields : mapping of str to QWidget
+        By the name of the setting, such as ``segment.depth_min_m``.
+    factors : mapping of str to float
+        What is shown for 1, for numbers in another unit.
+    parent : QObject, optional
 
     Attributes
     ----------
@@ -40,32 +86,47 @@ class EntriesForm(QWidget):
     changed = Signal()
 
     def __init__(
-        self, fields: Mapping[str, tuple[str, QWidget]], parent: QWidget | None = None
+        self,
+        fields: Mapping[str, QWidget],
+        factors: Mapping[str, float] = {},
+        parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
-        self._fields = {name: field for name, (_, field) in fields.items()}
-        make_equally_wide(one for one in self._fields.values() if isinstance(one, QSpinBox))
-        form = QFormLayout(self)
-        form.setContentsMargins(0, 0, 0, 0)
-        form.setHorizontalSpacing(SPACING_PX)
-        form.setVerticalSpacing(SPACING_PX // 2)
-        for text, field in fields.values():
-            form.addRow(label_for(field, text), field)
+        self._fields, self._factors = fields, factors
+        for field in fields.values():
             kind_of(field).change(field).connect(self.changed)
 
-    def show_entries(self, entries: object) -> None:
-        """Show the fields' values."""
-        self.enter(**{name: getattr(entries, name) for name in self._fields})
+    def show(self, settings: object) -> None:
+        """Show settings; an option that is None is shown as an empty one."""
+        for name, field in self._fields.items():
+            value: Any = reduce(getattr, name.split("."), settings)
+            if name in self._factors:
+                value = self._factors[name] * value
+            kind_of(field).show(field, "" if value is None else value)
 
-    def enter(self, **values: object) -> None:
-        """Show other values of some fields, as if typed."""
-        for name, value in values.items():
-            kind_of(self._fields[name]).show(self._fields[name], value)
+    def take(self, settings: Entries) -> Entries:
+        """Return settings with the values shown."""
+        changes: dict[str, Any] = {}
+        for name, field in self._fields.items():
+            value = kind_of(field).value(field)
+            if name in self._factors:
+                value = value / self._factors[name]
+            if value == "" and reduce(getattr, name.split("."), settings) is None:
+                value = None
+            *parents, last = name.split(".")
+            reduce(lambda part, parent: part.setdefault(parent, {}), parents, changes)[last] = value
+        return cast(Entries, _with(settings, changes))
 
-    def take(self, entries: Entries) -> Entries:
-        """Return the entered values."""
-        shown = {name: kind_of(field).value(field) for name, field in self._fields.items()}
-        return cast(Entries, replace(cast(Any, entries), **shown))
+
+def _with(settings: Any, changes: Mapping[str, Any]) -> object:
+    """Return settings with all changes at once: some are valid only together."""
+    return replace(
+        settings,
+        **{
+            name: _with(getattr(settings, name), value) if isinstance(value, dict) else value
+            for name, value in changes.items()
+        },
+    )
 
 
 class _Kind(NamedTuple):

@@ -262,8 +262,13 @@ def _nearest(field: QDoubleSpinBox | QSpinBox, text: str) -> str:
         number = float(_typed(field, text))
     except ValueError:
         return ""
-    nearest = type(field.value())(min(max(number, field.minimum()), field.maximum()))
-    return f"{field.textFromValue(nearest)}{field.suffix()}"
+    nearest = min(max(number, field.minimum()), field.maximum())
+    shown = (
+        field.textFromValue(round(nearest))
+        if isinstance(field, QSpinBox)
+        else field.textFromValue(nearest)
+    )
+    return f"{shown}{field.suffix()}"
 
 
 def _settle(field: Spin) -> Spin:

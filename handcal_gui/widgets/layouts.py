@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TypeAlias, TypeVar
 
-from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import (
     QBoxLayout,
     QFrame,
@@ -36,16 +34,6 @@ def vbox(
 ) -> QVBoxLayout:
     """Lay out items from top to bottom, on a widget or as a part of another layout."""
     return _fill(QVBoxLayout(on) if on else QVBoxLayout(), items, margins, spacing)
-
-
-def fit_soon(fit: Callable[[], object], parent: QWidget) -> QTimer:
-    """Return a timer that calls `fit`, which shows or hides parts, once a resize event has ended.
-
-    Qt has crashed where a part was hidden within the event that lays out its page.
-    """
-    timer = QTimer(parent, interval=0, singleShot=True)
-    timer.timeout.connect(fit)
-    return timer
 
 
 def scrollable(content: QWidget) -> QScrollArea:

@@ -30,6 +30,8 @@ _POLL_MS = 15
 class LiveCameras(QWidget):
     """Offers a choice for each camera, and shows simultaneous images of all of them.
 
+    Below the image of a camera with depth stand its model and serial number.
+
     Parameters
     ----------
     titles : sequence of str
@@ -72,6 +74,7 @@ class LiveCameras(QWidget):
         self._realsense, self._tell, self._open_source = realsense, tell, open_source
         self._live: LiveImages | None = None
         self._opened: dict[str, str] = {}
+        self._devices: dict[str, str] = {}  # by title, as the cameras themselves say
         self._wanted: dict[str, str] = {}
         self._warp: Callable[[UInt8], UInt8] | None = None
         self._sources = {title: choice("source", title, _SOURCES) for title in titles}
@@ -127,6 +130,7 @@ class LiveCameras(QWidget):
         """Show images of the chosen cameras."""
         self.stop()
         sources = self._opened = self.chosen
+        self._devices.clear()
         if need := self.need:
             self.failed.emit(need)
             return
@@ -135,7 +139,7 @@ class LiveCameras(QWidget):
             [
                 partial(
                     self._open_source,
-                    *(source, self._realsense, _PLAYBACK, partial(self._tell, title)),
+                    *(source, self._realsense, _PLAYBACK, partial(self._tell_device, title)),
                 )
                 for title, source in sources.items()
             ]
@@ -194,10 +198,16 @@ class LiveCameras(QWidget):
         if newest is None or newest is self.images:
             return
         self.images = newest
-        self._show_message("")
-        for shown, image in zip(self._views.values(), newest, strict=True):
+        for (title, shown), image in zip(self._views.items(), newest, strict=True):
+            shown.show_text(caption=self._devices.get(title, ""))
             shown.show_image(image if self._warp is None else self._warp(image))
         self.images_changed.emit()
+
+    def _tell_device(self, title: str, frame: Frame, identity: CameraIdentity) -> None:
+        """Note which of several cameras it is, to show it, and tell it on; in another thread."""
+        parts = identity.model, identity.serial_number
+        self._devices[title] = ", ".join(part for part in parts if part)
+        self._tell(title, frame, identity)
 
     def _fail(self, why: str) -> None:
         self.stop()

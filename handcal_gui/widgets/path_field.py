@@ -8,15 +8,11 @@ from pathlib import Path
 from typing import Literal
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QKeySequence, QPaintEvent, QShortcut
+from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QFileDialog,
     QLineEdit,
     QPushButton,
-    QStyle,
-    QStyleOptionFrame,
-    QStylePainter,
-    QToolButton,
     QWidget,
 )
 
@@ -30,8 +26,6 @@ INTRINSICS_FILES = tr("Intrinsics (*.yaml *.yml *.xml *.json)")
 """File filter for a camera's intrinsics."""
 _KEY = "F4"
 """Opens the dialog of the field that has the focus, as it opens a list."""
-_INSET_PX = 2
-"""Between the frame of a line edit and its text, as in Qt."""
 
 
 class PathField(QWidget):
@@ -73,7 +67,7 @@ class PathField(QWidget):
         self._checked: tuple[Path, int] | None = None
         self._problem = ""
         self._pattern = pattern
-        self._line = _PathLine(placeholderText=empty, clearButtonEnabled=bool(empty))
+        self._line = QLineEdit(placeholderText=empty, clearButtonEnabled=bool(empty))
         self._line.setAccessibleName(name)
         self._line.textChanged.connect(self._show_whole_path)
         self._line.textChanged.connect(self.changed)
@@ -139,28 +133,3 @@ class PathField(QWidget):
     def _show_whole_path(self) -> None:
         text = "\n".join(filter(None, (self.path, self.toolTip())))
         self._line.setToolTip(plain_tooltip(text))
-
-
-class _PathLine(QLineEdit):
-    """Elides the middle of a path that does not fit, unless it is being edited."""
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        """Draw the path from its beginning to its end."""
-        option = QStyleOptionFrame()
-        self.initStyleOption(option)
-        contents = QStyle.SubElement.SE_LineEditContents
-        room = self.style().subElementRect(contents, option, self)
-        room.adjust(_INSET_PX, 0, -_INSET_PX, 0)
-        for clear in self.findChildren(QToolButton):
-            room.setRight(min(room.right(), clear.x()))
-        shown = self.fontMetrics().elidedText(
-            self.text(), Qt.TextElideMode.ElideMiddle, room.width()
-        )
-        if self.hasFocus() or shown == self.text():
-            super().paintEvent(event)
-            return
-        painter = QStylePainter(self)
-        painter.drawPrimitive(QStyle.PrimitiveElement.PE_PanelLineEdit, option)
-        painter.setPen(option.palette.text().color())
-        painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, shown)
-        painter.end()

@@ -6,15 +6,12 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from handcal.core.types import EYES, Eye, EyeShift, VerdictName
 from handcal.register import verdict_words
 from handcal.register.results import Results
 from handcal.report.cells import signed
 from handcal.session.judged_trials import EyeTrials, is_doubted
-from handcal.session.record import SessionRecord
-from handcal.session.trial import SAME_SHIFT_M, Trial
+from handcal.session.trial import Trial
 from handcal_gui.app.translation import tr
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.sentence import sentence
@@ -193,16 +190,6 @@ def result_rows(results: Results, trials: Row | None = None) -> list[Row]:
         fused = tr("{}, {} verified").format(fused, verified)
     meaning = tr("Alignments and verified eyes that were fused; solver: {}").format(results.method)
     return [*rows, Row(tr("Solved from"), (fused,), meaning)]
-
-
-def fine_tuned_texts(results: Results, record: SessionRecord) -> dict[Eye, str]:
-    """Return φ of each eye whose final φ was set by hand after the results."""
-    calibrated_m = results.rendered_shift_m
-    return {
-        eye: tr("φ = ({}) mm").format(", ".join(signed(1e3 * float(one), 2) for one in tuned_m))
-        for eye, tuned_m in record.set_by_hand_m.items()
-        if eye in calibrated_m and np.abs(tuned_m - calibrated_m[eye]).max() >= SAME_SHIFT_M
-    }
 
 
 def eyes_text(eyes: Sequence[Eye]) -> str:

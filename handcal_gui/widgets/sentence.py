@@ -12,8 +12,3 @@ def sentence(text: str) -> str:
 def lowered(text: str) -> str:
     """Return a text to follow a colon."""
     return text[:1].lower() + text[1:]
-
-
-def with_advice(text: str, advice: str) -> str:
-    """Return a text with advice after a semicolon, unless it has some there."""
-    return text if "; " in text else f"{text}; {advice}"

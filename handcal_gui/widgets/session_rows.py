@@ -11,6 +11,7 @@ import numpy as np
 from handcal.core.types import EYES
 from handcal.register.results import Results
 from handcal.report.cells import signed
+from handcal.session.comparison import count_comparisons, read_comparisons
 from handcal.session.session import SessionRecord
 from handcal.session.state import Kind, SessionEvent
 from handcal.session.trial import Trial, TrialSpread, trial_spread
@@ -85,6 +86,25 @@ _RESTORED: dict[str, Kind] = {
     SessionEvent.ALIGNMENT_RESTORED: "alignment",
     SessionEvent.TRIAL_RESTORED: "trial",
 }
+
+
+def session_facts(record: SessionRecord) -> dict[str, str]:
+    """Return how a session was made: facts that a result is to be cited with."""
+    compared = count_comparisons(read_comparisons(record.events))
+    answers = compared.applied, compared.offline, compared.neither
+    facts = {
+        tr("Started"): local_time(record.events[0].time, "%Y-%m-%d %H:%M UTC%z"),
+        tr("Rig"): record.rig.name,
+        tr("Plan"): str(record.facts.plan or ""),
+        tr("Method"): str((record.results or {}).get("method", "")),
+        tr("Simulated"): record.simulated,
+        tr("Compared blindly"): tr("better with the calibration {}, without {}, neither {}").format(
+            *answers
+        )
+        if any(answers)
+        else "",
+    }
+    return {name: fact for name, fact in facts.items() if fact}
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,6 +30,7 @@ _NO_INDEX = QModelIndex()
 _MOST_PX = 300
 """Width of a column at most; a longer text is cut, and whole in the tooltip."""
 _LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+_CENTRE = Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignVCenter
 _RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 
 
@@ -41,7 +42,7 @@ class Column:
     tooltip: str = ""
     is_number: bool = True
     rank: int = 0
-    """Where not all columns fit, those of the highest rank are left out first, down to 1."""
+    """Columns of the highest rank are left out first if not all fit; those of rank 0 never."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +50,7 @@ class Row:
     """A row of a table."""
 
     label: str
-    """Stands before the cells; where no row has one, there is no column for it."""
+    """Stands before the cells; there is no column for it if no row has one."""
     cells: tuple[str, ...]
     """If cells are missing, the last one spans the rest."""
     tooltip: str = ""
@@ -117,15 +118,24 @@ class _Model(QAbstractTableModel):
             case Qt.ItemDataRole.AccessibleDescriptionRole if place == 0:
                 return row.picture_text
             case Qt.ItemDataRole.ToolTipRole:
-                hidden = (f"{self.columns[i].title}: {texts[i]}" for i in self.hidden)
+                titles = ((i, self.columns[i].title.replace("\n", " ")) for i in self.hidden)
+                hidden = (f"{title}: {texts[i]}" for i, title in titles)
                 text = texts[place] if place < len(texts) and row.key is not None else ""
                 lines = text, row.tooltip or column.tooltip, *hidden
                 return plain_tooltip("\n".join(filter(None, lines)))
             case Qt.ItemDataRole.FontRole if column.is_number:
                 return self._font
             case Qt.ItemDataRole.TextAlignmentRole:
-                return _RIGHT if column.is_number else _LEFT
+                return self._alignment(place)
         return None
+
+    def _alignment(self, place: int) -> Qt.AlignmentFlag:
+        if not self.columns[place].is_number:
+            return _LEFT
+        # On the right, a number would run into the text of the next column.
+        shown = (i for i in range(place + 1, len(self.columns)) if i not in self.hidden)
+        following = next(shown, place)
+        return _RIGHT if self.columns[following].is_number else _CENTRE
 
     def headerData(
         self,
@@ -139,7 +149,7 @@ class _Model(QAbstractTableModel):
         texts = {
             Qt.ItemDataRole.DisplayRole: column.title,
             Qt.ItemDataRole.ToolTipRole: column.tooltip,
-            Qt.ItemDataRole.TextAlignmentRole: _RIGHT if column.is_number else _LEFT,
+            Qt.ItemDataRole.TextAlignmentRole: self._alignment(section),
         }
         return texts.get(Qt.ItemDataRole(role))
 
@@ -299,12 +309,6 @@ class Table(QTableView):
         """Allow or forbid deleting."""
         self._is_read_only = is_read_only
         self._note_chosen()
-
-    @property
-    def whole_height_px(self) -> int:
-        """The height at which no row needs scrolling."""
-        rows_px = self.verticalHeader().length() + self.horizontalHeader().sizeHint().height()
-        return rows_px + 2 * self.frameWidth()
 
     def as_text(self) -> str:
         """Return the table as tab-separated lines, with a line of headings first."""

@@ -47,8 +47,8 @@ from tests.campaigns.mutate import mutated
 FILES, SHORT_FILES, BATCH = 20_000, 80, 100
 SLOWEST_S, MOST_MB, ENDED_S = 5.0, 500, 20
 IMPORTED = (
-    *(f"handcal.cli.{name}" for name in ("cameras", "evaluate", "rig", "rig_files", "sessions")),
-    "handcal.camera.playback", "handcal.cli.replay", "handcal.cli.rig_displays",
+    *(f"handcal.cli.{name}" for name in ("evaluate", "recordings", "rig", "rig_files", "sessions")),
+    "handcal.camera.playback", "handcal.cli.cameras",
     "handcal.cli.simulate", "handcal.export.export", "handcal.hand.shipped",
     "handcal.calibration.solve_again",
 )  # fmt: skip

@@ -22,7 +22,7 @@ from handcal.station.station import Station
 from tests.campaigns.campaign import Tally, campaign
 from tests.helpers import write_small_rig
 
-FRAMES, SHORT_FRAMES = 20_000, 60
+FRAMES, SHORT_FRAMES = 20_000, 45
 GROWTH_MAX = 1.02
 SHORT_GROWTH_MAX_MB = 20.0
 """From a third of a short run to its end: what is solved and imported late takes up to 10 MB."""

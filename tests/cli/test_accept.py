@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from handcal.cli.main import parse
-from handcal.core.errors import FileError, HandcalError
+from handcal.core.errors import HandcalError
 from handcal.core.geometry import rigid
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig
@@ -44,12 +44,6 @@ def test_a_right_rig_passes_and_a_turned_camera_fails(
     assert not json.loads(result.read_text())["passed"]
     assert "FAILED" in (images / "page" / "report.html").read_text("utf-8")
     capsys.readouterr()
-
-
-def test_missing_images_are_named(tmp_path: Path) -> None:
-    write_rig(tmp_path / "rig.yaml", example_rig())
-    with pytest.raises(FileError, match=r"camera\.json"):
-        accept(tmp_path, tmp_path / "rig.yaml")
 
 
 def test_the_images_to_practise_with_come_with_all_there_is_to_enter(

@@ -1,10 +1,10 @@
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from handcal.cli.main import main
 from handcal.core.geometry import rigid
 from handcal.core.types import Intrinsics
 from handcal.io.images import write_png
@@ -15,22 +15,6 @@ from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter
 
 CAMERA = Intrinsics(640, 360, 900.0, 900.0, 320.0, 180.0)
-
-
-def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> None:
-    monkeypatch.setattr("sys.argv", ["handcal", "evaluate", "cube", *map(str, arguments)])
-    main()
-
-
-def refused(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *arguments: object
-) -> str:
-    with pytest.raises(SystemExit) as ended:
-        run(monkeypatch, *arguments)
-    assert ended.value.code in (1, 2)
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1
-    return error
 
 
 @pytest.fixture
@@ -50,24 +34,24 @@ def captures(tmp_path: Path) -> Path:
 
 
 def test_a_net_is_made_with_its_description(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    handcal: Callable[..., None], fails: Callable[..., tuple[int, str]], tmp_path: Path
 ) -> None:
     pdf, description = tmp_path / "out" / "net.pdf", tmp_path / "out" / "cube.json"
     sides = ("--side-mm", 50, "--marker-mm", 35, "--ids", 9, 8, 7, 6, 5, 4)
-    run(monkeypatch, "net", "--pdf", pdf, "--cube", description, *sides)
+    handcal("evaluate", "cube", "net", "--pdf", pdf, "--cube", description, *sides)
     assert pdf.read_bytes().startswith(b"%PDF")
     assert read_cube(description) == Cube(0.05, 0.035, "DICT_4X4_50", (9, 8, 7, 6, 5, 4))
-    assert "more than a4" in refused(monkeypatch, capsys, "net", "--pdf", pdf, "--side-mm", 75)
+    assert "more than a4" in fails("evaluate", "cube", "net", "--pdf", pdf, "--side-mm", 75)[1]
 
 
 def test_captures_are_reported(
+    handcal: Callable[..., None],
     captures: Path,
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     output, figures = tmp_path / "report", tmp_path / "figures.json"
-    run(monkeypatch, "report", captures, "--output", output, "--json", figures)
+    handcal("evaluate", "cube", "report", captures, "--output", output, "--json", figures)
     assert (output / "report.pdf").is_file()
     assert (output / "report.html").is_file()
     found = json.loads(figures.read_text())
@@ -79,29 +63,13 @@ def test_captures_are_reported(
     assert "virtual" in said
 
 
-def test_captures_of_which_none_can_be_used_are_told(
-    captures: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    write_png(captures / "centre" / "pose-1" / "real.png", np.zeros((360, 640), np.uint8))
-    assert "no pair of captures" in refused(monkeypatch, capsys, "report", captures)
-
-
-def test_a_report_never_goes_into_a_study(
-    captures: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (captures / "study.json").write_text("{}")
-    told = refused(monkeypatch, capsys, "report", captures, "--output", captures)
-    assert "holds a study" in told
-    assert not (captures / "report.pdf").exists()
-
-
 def test_misuse_is_one_line(
-    captures: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    captures: Path, monkeypatch: pytest.MonkeyPatch, fails: Callable[..., tuple[int, str]]
 ) -> None:
     nowhere = captures / "nowhere"
-    assert "cube.json" in refused(monkeypatch, capsys, "report", nowhere)
-    assert "not empty" in refused(monkeypatch, capsys, "simulate", captures)
+    assert "cube.json" in fails("evaluate", "cube", "report", nowhere)[1]
+    assert "not empty" in fails("evaluate", "cube", "simulate", captures)[1]
     monkeypatch.setattr("handcal.camera.viewpoint.list_viewpoints", lambda: [0, 2])
-    assert "cameras 0, 2 are there" in refused(monkeypatch, capsys, "capture", captures)
-    wrong = ("capture", captures, "--positions", "a/b")
-    assert "letters, digits" in refused(monkeypatch, capsys, *wrong)
+    assert "cameras 0, 2 are there" in fails("evaluate", "cube", "capture", captures)[1]
+    wrong = fails("evaluate", "cube", "capture", captures, "--positions", "a/b")
+    assert "letters, digits" in wrong[1]

@@ -54,12 +54,6 @@ def test_the_cube_of_a_recording_is_tracked(
     assert "40 poses in 40 frames" in capsys.readouterr().out
 
 
-def test_a_recording_without_the_cube_says_why(tmp_path: Path) -> None:
-    played = recording(tmp_path / "take", 3, has_cube=False)
-    with pytest.raises(HandcalError, match="the cube was not tracked: no marker of the cube"):
-        run("cube", "track", "--camera", played, "--no-headset", "--seconds", 20)
-
-
 def test_a_session_of_a_real_wearer_has_no_simulated_one(tmp_path: Path) -> None:
     session = tmp_path / "session"
     shutil.copytree(ROOT / "resources" / "example_session", session)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,7 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from handcal.cli.main import main
+from handcal.cli.main import main, parse
+from handcal.cli.terminal import settings_of
+from handcal.lab.settings import ProcedureStudySettings
 from handcal.lab.study import noise, studies
 
 TINY = replace(
@@ -94,45 +95,6 @@ def test_an_interrupted_study_goes_on(
     assert (tmp_path / "study" / "rows.csv").exists()
 
 
-def test_a_folder_of_another_seed_is_refused(
-    study: Callable[..., None], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "study").mkdir()
-    (tmp_path / "study" / "study.json").write_text('{"name": "noise", "settings": {"seed": 7}}')
-    assert fails(study) == 1
-    assert "seed 7 there, 1 here" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("--workers", "0"), "'0' is not a whole number from 1 to 1024"),
-        (("--workers", "many"), "'many' is not a whole number"),
-        (("--seed", "-1"), "'-1' is not a whole number"),
-    ],
-)
-def test_wrong_arguments(
-    study: Callable[..., None],
-    arguments: tuple[str, ...],
-    message: str,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    assert fails(study, *arguments) == 2
-    assert message in capsys.readouterr().err
-
-
-@pytest.mark.process
-def test_a_cluster_that_is_not_there_is_one_line(tmp_path: Path) -> None:
-    pytest.importorskip("distributed")
-    words = "study", "noise", "--quick", "--scheduler", "nowhere", "--output", str(tmp_path)
-    run = subprocess.run(
-        [sys.executable, "-m", "handcal", *words], capture_output=True, text=True, check=False
-    )
-    assert run.returncode == 1
-    assert run.stderr.startswith("handcal: no Dask scheduler answers at 'nowhere'")
-    assert run.stderr.count("\n") == 1
-
-
 def test_open3d_solves_too_where_it_is_requested(
     study: Callable[..., None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -143,13 +105,14 @@ def test_open3d_solves_too_where_it_is_requested(
     assert rows.count(",icp-open3d,") == rows.count(",icp,") > 0
 
 
-def test_open3d_that_is_missing_is_one_line(
-    study: Callable[..., None],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.setitem(sys.modules, "open3d", None)
-    assert fails(study, "--open3d") == 1
-    error = capsys.readouterr().err
-    assert "pip install 'handcal[3d]'" in error
-    assert error.count("\n") == 1
+def test_every_option_reaches_the_study_of_procedures() -> None:
+    line = (
+        "study procedures --wearers 3 --seed 2 --plan paper spaam-9 --variant drift --scale 1 2 "
+        "--eye-distance ruler --prior learned --wearer-prior learned --sensor ahat --fatten-px 1 "
+        "--workers 2 --scheduler tcp://a:1 --output b"
+    )
+    expected = ProcedureStudySettings(
+        *(3, 2, ("paper", "spaam-9"), ("drift",), (1.0, 2.0), "ruler", "learned", "learned"),
+        *("ahat", 1.0, 2, "tcp://a:1", "b"),
+    )
+    assert settings_of(ProcedureStudySettings, parse(line.split())) == expected

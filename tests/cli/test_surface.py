@@ -6,11 +6,19 @@ After a deliberate change, write the list again: ``python -m tests.cli.test_surf
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+import pkgutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from importlib import import_module
+from importlib.metadata import version
 from typing import get_args
 
-from handcal.cli.main import COMMANDS, Entry, load
-from handcal.cli.terminal import Parser
+import pytest
+
+import handcal.cli
+from handcal.cli.main import COMMANDS, Group, load, purpose
+from handcal.cli.terminal import Command, Parser
 from handcal.export.formats import FORMATS, TOOL_FORMATS, Format
 from tests.helpers import DATA
 
@@ -18,27 +26,37 @@ COMMAND_LIST = DATA / "commands.json"
 FORMAT_LIST = [
     "report", "html", "csv", "yaml", "json", "ply", "zip", "unity", "openxr", "northstar", "slicer",
 ]  # fmt: skip
+HEAVY = {"numpy", "scipy", "cv2", "rich", "matplotlib", "onnxruntime", "handcal.core.types"}
+HELP = f"""
+import sys
+from handcal.cli.main import main
+try:
+    main()
+finally:
+    sys.stderr.write(" ".join({HEAVY} & sys.modules.keys()))
+"""
 
 
-def leaves(entries: Mapping[str, Entry], *groups: str) -> Iterator[tuple[tuple[str, ...], str]]:
+def leaves(entries: Mapping[str, str | Group] = COMMANDS, *words: str) -> Iterator[tuple[str, str]]:
+    """Yield the words of each command, and its module."""
     for name, entry in entries.items():
-        if isinstance(entry.home, str):
-            yield (*groups, name), entry.home
+        if isinstance(entry, Group):
+            yield from leaves(entry.commands, *words, name)
         else:
-            yield from leaves(entry.home, *groups, name)
+            yield " ".join([*words, name]), entry
 
 
 def listed() -> dict[str, list[str]]:
     """Return the options and arguments of each command."""
     commands = {}
-    for words, home in leaves(COMMANDS):
+    for words, module in leaves():
         parser = Parser(add_help=False)
-        load(words[-1], home).add_to(parser)
+        load(words.split()[-1], module).add_to(parser)
         names = (
             action.option_strings or [str(action.metavar or action.dest.upper())]
             for action in parser._actions
         )
-        commands[" ".join(words)] = sorted(name for those in names for name in those)
+        commands[words] = sorted(name for those in names for name in those)
     return commands
 
 
@@ -48,6 +66,66 @@ def test_every_command_and_option_is_there() -> None:
 
 def test_every_format_of_an_export_is_there() -> None:
     assert [*FORMATS, *TOOL_FORMATS] == FORMAT_LIST == list(get_args(Format))
+
+
+def test_every_command_is_in_the_table_with_its_purpose() -> None:
+    there = {
+        (name.replace("_", "-"), module.name, value.run.__doc__)
+        for module in pkgutil.iter_modules(handcal.cli.__path__)
+        for name, value in vars(import_module(f"handcal.cli.{module.name}")).items()
+        if isinstance(value, Command)
+    }
+    names = [(words.split()[-1], module) for words, module in leaves()]
+    assert there == {(name, module, purpose(name, module)) for name, module in names}
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("words", ["", "rig", "evaluate cube"])
+def test_the_help_of_a_group_imports_no_command(words: str) -> None:
+    ended = subprocess.run(
+        [sys.executable, "-c", HELP, *words.split(), "--help"], capture_output=True, text=True
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert "COMMAND" in ended.stdout
+
+
+def test_every_command_has_help(
+    handcal: Callable[..., None], capsys: pytest.CaptureFixture[str]
+) -> None:
+    for words, _ in leaves():
+        with pytest.raises(SystemExit, match="0"):
+            handcal(*words.split(), "--help")
+        shown = capsys.readouterr().out
+        assert shown.startswith(f"usage: handcal {words} ")
+        assert "None" not in shown
+
+
+@pytest.mark.parametrize(
+    ("line", "problem"),
+    [
+        ("", "required: COMMAND; see handcal --help"),
+        ("sol", "invalid choice: 'sol'"),
+        ("--nonsense solve", "required: session; see handcal solve --help"),
+        ("--nonsense solve a", "unrecognized arguments: --nonsense; see handcal --help"),
+        ("solve a --nonsense", "unrecognized arguments: --nonsense; see handcal solve --help"),
+        ("rig", "required: COMMAND; see handcal rig --help"),
+        ("-- nonsense", "invalid choice: "),
+    ],
+)
+def test_a_wrong_name_is_one_line(
+    fails: Callable[..., tuple[int, str]], line: str, problem: str
+) -> None:
+    code, error = fails(*line.split())
+    assert code == 2
+    assert problem in error
+
+
+def test_the_version_is_printed(
+    handcal: Callable[..., None], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        handcal("--version", "solve")
+    assert capsys.readouterr().out == f"handcal {version('handcal')}\n"
 
 
 if __name__ == "__main__":

@@ -6,7 +6,6 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -14,8 +13,6 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.cli import main
-from handcal.cli.main import Entry
 from handcal.core.geometry import rigid
 from handcal.io.configuration import configuration_folder
 from handcal.io.resources import resource_path
@@ -25,6 +22,7 @@ from handcal.sim.hand import make_hand
 from handcal.sim.render import World
 from handcal.sim.room import make_room
 from handcal.sim.scene import SceneState
+from tests.cli.test_surface import leaves
 from tests.helpers import FOLDERS, SILENCERS, write_small_rig
 
 pytestmark = pytest.mark.process
@@ -97,16 +95,8 @@ NEED_MORE = {
 ``openxr install`` also writes where OpenXR looks for layers: tests/export/test_openxr.py."""
 
 
-def leaves(entries: Mapping[str, Entry], *groups: str) -> Iterator[str]:
-    for name, entry in entries.items():
-        if isinstance(entry.home, str):
-            yield " ".join([*groups, name])
-        else:
-            yield from leaves(entry.home, *groups, name)
-
-
 def test_every_command_is_tried_or_named() -> None:
-    assert {*leaves(main.COMMANDS)} == COMMANDS.keys() | NEED_MORE
+    assert {words for words, _ in leaves()} == COMMANDS.keys() | NEED_MORE
 
 
 _DRIVER = """

@@ -93,16 +93,6 @@ def test_impossible_mounts_are_refused(drawings: ModuleType) -> None:
             drawings.Mount(**wrong)
 
 
-def test_a_line_of_sight_goes_through_what_is_looked_through(drawings: ModuleType) -> None:
-    width, height = drawings.BOX_PX
-    for _, lookers, things, _ in drawings.ARRANGEMENTS.values():
-        (x0, y0, _), (x1, y1, _) = lookers[-1], things[-1]
-        for x, y, _ in things[:-1]:
-            for side in (x, x + width):
-                share = (side - x0 - width) / (x1 - x0 - width)
-                assert y < y0 + height / 2 + (y1 - y0) * share < y + height
-
-
 def test_the_drawings_are_those_of_the_script(drawings: ModuleType) -> None:
     pictures = ROOT / "docs" / "pictures"
     made = {name: drawings.arrangement_svg(name) for name in drawings.ARRANGEMENTS}

@@ -143,7 +143,8 @@ def test_one_that_fails_is_named_and_spares_the_others(paths: list[Path], tmp_pa
     assert "does not begin as the journal" in missing
     assert "1 wearer was calibrated (2 sessions" in made.sentence
     whats, shares = zip(*shown, strict=True)
-    assert all(what.startswith(("1 of 3: ", "2 of 3: ", "3 of 3: ")) for what in whats)
+    begins = "1 of 3: ", "2 of 3: ", "3 of 3: ", "All sessions"
+    assert all(what.startswith(begins) for what in whats)
     solving = "3 of 3: Anna, exporting 1 of 2, Parameters and trials (CSV): solving"
     assert any(what.startswith(solving) for what in whats)
     assert list(shares) == sorted(shares)

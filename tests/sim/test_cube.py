@@ -6,7 +6,7 @@ import pytest
 from handcal.core.display import eye_projection
 from handcal.core.geometry import image_points, project, rigid, transform
 from handcal.core.types import Float64, Intrinsics
-from handcal.lab.evaluate.cube import CubeMisalignment, compare_cubes
+from handcal.lab.evaluate.cube_test import CubeMisalignment, compare_cubes
 from handcal.rig.cube.cube import Cube, find_cube, marker_corners_m
 from handcal.rig.example import example_rig
 from handcal.sim.boards import PictureSettings

@@ -9,14 +9,12 @@ pytest.importorskip("onnx")
 import onnxruntime
 import torch
 
-from handcal.core.errors import FileError
 from handcal.core.types import Float32, UInt8
 from handcal.hand.detect import points
 from handcal.hand.shipped import FLOAT_MODEL
 from handcal.io.resources import resource_path
 from handcal.lab.evaluate.annotations import Photo
 from handcal.train.export import export_integer
-from handcal.train.loop import read_average
 from handcal.train.model import HandNet
 
 
@@ -53,8 +51,3 @@ def test_integers_come_close_in_a_third_of_the_bytes(tmp_path: Path, noise: UInt
     assert integer_model.stat().st_size < 0.35 * float_model.stat().st_size
     floats = run(float_model, noise[:1])
     assert np.abs(run(integer_model, noise[:1]) - floats).mean() < 0.2 * floats.std()
-
-
-def test_without_training_there_is_nothing_to_export(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match="train first"):
-        read_average(tmp_path)

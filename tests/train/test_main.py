@@ -25,11 +25,3 @@ def test_missing_data_is_reported_in_one_line_before_anything_is_written(
     assert said.startswith(f"handcal: cannot read {data}")
     assert said.count("\n") == 1
     assert not folder.exists()
-
-
-def test_it_starts_from_a_backbone_or_a_model_not_both(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    words = ("--data", tmp_path, "--model", "x.onnx", "--backbone", tmp_path)
-    assert run(monkeypatch, *words) == 2
-    assert "not allowed with" in capsys.readouterr().err

@@ -10,18 +10,17 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from handcal.core.progress import Progress
-from handcal.lab.bench.cameras import measure_cameras
-from handcal.lab.bench.delivery import measure_delivery
-from handcal.lab.bench.measured_clouds import measure_covariance, measure_cuts
-from handcal.lab.bench.offline import measure_offline
-from handcal.lab.bench.paper_simulation import measure_paper_simulation
-from handcal.lab.bench.peers import measure_peers
-from handcal.lab.bench.scale import measure_scale
-from handcal.lab.bench.settings import BenchSettings
-from handcal.lab.bench.speed import measure_speed
-from handcal.lab.bench.spoiled_clouds import measure_spoiled_clouds
-from handcal.lab.bench.trials import Measured
-from handcal.lab.bench.wearer import measure_wearer
+from handcal.lab.bench.accuracy import (
+    measure_cameras,
+    measure_covariance,
+    measure_cuts,
+    measure_offline,
+    measure_paper_simulation,
+    measure_wearer,
+)
+from handcal.lab.bench.registration import measure_peers, measure_spoiled_clouds
+from handcal.lab.bench.speed import measure_delivery, measure_scale, measure_speed
+from handcal.lab.bench.trials import BenchSettings, Measured
 
 PARTS: dict[str, Callable[[BenchSettings, Progress], Measured]] = {
     "speed": measure_speed,

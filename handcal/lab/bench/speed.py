@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import perf_counter, thread_time
 from typing import TypeVar
 
@@ -12,13 +14,18 @@ import numpy as np
 from handcal.core.errors import HandError
 from handcal.core.geometry import rigid
 from handcal.core.progress import Progress
-from handcal.core.types import EYES, Alignment, Float64, Frame
+from handcal.core.types import EYES, Alignment, Float64, Frame, HeadsetIdentity
 from handcal.hand.roi import Detector, RoiFinder
 from handcal.hand.segment import SegmentSettings, segment_hand
 from handcal.hand.shipped import load_detector
-from handcal.lab.bench.figure import BenchFigure
-from handcal.lab.bench.settings import BenchSettings
-from handcal.lab.bench.trials import Measured, trial_hand
+from handcal.lab.bench.trials import BenchFigure, BenchSettings, Measured, trial_hand
+from handcal.lab.study.noise import FLOOR, NoiseSettings, noise_study
+from handcal.lab.study.run import Study, run_study
+from handcal.lab.study.store import StudyRow
+from handcal.link.client import HeadsetClient
+from handcal.link.impair import Impairment
+from handcal.link.pairing import new_device_id, new_pairing_key
+from handcal.link.server import HeadsetServer
 from handcal.register.guard import RotationGuard, rotation_between
 from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig
@@ -196,3 +203,99 @@ def _medians_ms(inputs: Sequence[Input], *actions: Callable[[Input], object]) ->
             action(value)
             durations.append(perf_counter() - start_s)
     return [1e3 * float(np.median(durations)) for durations in durations_s]
+
+
+# Latency of sending a cursor to the headset, on a good network and on a bad one.
+
+_LOSSES = 0.0, 0.3
+_PATIENCE_S = 5.0
+
+
+def measure_delivery(settings: BenchSettings, progress: Progress) -> Measured:
+    """Measure the time until a cursor is acknowledged over loopback."""
+    figures = []
+    worst_ms = {}
+    for done, loss in enumerate(_LOSSES, 1):
+        durations_ms = _cursor_durations_ms(loss, settings)
+        median_ms = float(np.median(durations_ms))
+        figures.append(BenchFigure(f"cursor acknowledged, {loss:.0%} loss", median_ms, "ms"))
+        worst_ms[f"{loss:g}"] = max(durations_ms)
+        progress.at(done / len(_LOSSES))
+    return Measured(figures, {"worst_ms_at_loss": worst_ms})
+
+
+def _cursor_durations_ms(loss: float, settings: BenchSettings) -> list[float]:
+    """Time successive cursors, with datagrams lost and reordered with probability `loss`."""
+    rng = np.random.default_rng(0)
+    key = new_pairing_key().encode()
+    identity = HeadsetIdentity(new_device_id())
+    impairment = Impairment(loss, reorder=loss)
+    durations_ms = []
+    with (
+        HeadsetServer(key) as server,
+        HeadsetClient(server.address, key, identity, impairment=impairment),
+    ):
+        server.wait_connected(_PATIENCE_S)
+        for number in range(1, settings.repeats + 1):
+            cursor_m = rng.uniform(-0.1, 0.1, (settings.points, 3))
+            start_s = perf_counter()
+            server.wait_acked(server.send_cursor(cursor_m, number), _PATIENCE_S)
+            durations_ms.append(1e3 * (perf_counter() - start_s))
+    return durations_ms
+
+
+# Speed of a study, with one and with two processes.
+
+# Each process makes its own hands; in a whole study this time is negligible.
+_HANDS = 2
+_WORKERS_SPEED_UP = 1.7
+_PER_MINUTE = 2000.0
+
+
+def measure_scale(settings: BenchSettings, progress: Progress) -> Measured:
+    """Run a small noise study in this process, then in two, including their start."""
+    if not settings.study_trials:
+        progress.at(1.0)
+        return Measured([], {})
+    study = noise_study(
+        replace(
+            NoiseSettings(),
+            trials=settings.study_trials,
+            hands=_HANDS,
+            shapes=0,
+            linear_trials=1,
+            paper_trials=0,
+        )
+    )
+    alone_s, _ = _timed(study, 1, progress.part(0.0, 0.6))
+    together_s, rows = _timed(study, 2, progress.part(0.6, 1.0))
+    solved = sum(row["method"] != FLOOR for row in rows)
+    return Measured(
+        [
+            BenchFigure(
+                "noise study: alignments solved a minute, two workers",
+                60.0 * solved / together_s,
+                "",
+                at_least=_PER_MINUTE,
+            ),
+            BenchFigure(
+                "noise study: two workers / one",
+                alone_s / together_s,
+                "",
+                at_least=_WORKERS_SPEED_UP,
+            ),
+        ],
+        {
+            "alignments": len(study.cases),
+            "solved": solved,
+            "one_worker_s": alone_s,
+            "two_workers_s": together_s,
+        },
+    )
+
+
+def _timed(study: Study, workers: int, progress: Progress) -> tuple[float, list[StudyRow]]:
+    with TemporaryDirectory() as folder:
+        start_s = perf_counter()
+        rows = run_study(study, Path(folder), workers=workers, progress=progress)
+        return perf_counter() - start_s, rows

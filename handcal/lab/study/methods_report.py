@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
 from handcal.core.display import TARGET_DEPTHS_M
-from handcal.core.types import EYES, Float64
+from handcal.core.types import EYES, Bool
 from handcal.export.figures import COLORS, name_axes
-from handcal.lab.methods.published import MISALIGNMENT, REPROJECTION
+from handcal.lab.methods import MISALIGNMENT, REPROJECTION
 from handcal.lab.study.methods import HANDCAL_BOTH, HANDCAL_EACH, PAPER, MethodSettings
 from handcal.lab.study.store import StudyRow
 from handcal.report.document import Column, Figure, Report, Section, Table, facts
@@ -20,7 +22,21 @@ from handcal.report.provenance import made_with, settings_items
 from handcal.report.statistics import mean_interval, summarise
 from handcal.rig.example import example_rig
 
+ErrorTable: TypeAlias = "NDArray[np.void]"
+"""`_COLUMNS` of each row of the study."""
+
 ARCMIN_COLUMNS = tuple(f"{eye}_{corner}_arcmin" for eye in EYES for corner in (1, 2, 3, 4))
+_MM_COLUMNS = tuple(f"{axis}_mm" for axis in "xyz")
+_NUMBERS = {
+    "wearer": int,
+    "eye_distance_sigma_mm": float,
+    "method": object,
+    "alignments": int,
+    "wearer_s": float,
+    "depth_m": float,
+    "refused": bool,
+}
+_COLUMNS = np.dtype([*_NUMBERS.items(), ("arcmin", float, 8), ("mm", float, 3)])
 _MODEL = (
     "Every method calibrates the same simulated wearers of the example rig. What they align is "
     "found by rays through the displays; no method's equation takes part. Errors are of a square "
@@ -42,42 +58,49 @@ _NAMES_MM = 42.0
 
 def methods_report(settings: MethodSettings, rows: Sequence[StudyRow]) -> Report:
     """Return the report of a method comparison."""
-    first = _population(rows, settings.eye_distance_sigmas_m[0])
+    errors = _error_table(rows)
+    judged = errors[~errors["refused"] & _is_population(errors, settings.eye_distance_sigmas_m[0])]
     paper, one, three, each = (
-        float(_arcmin(_of(first, name)).mean())
+        float(judged[judged["method"] == name]["arcmin"].mean())
         for name in (PAPER, f"{HANDCAL_BOTH} 1", f"{HANDCAL_BOTH} 3", f"{HANDCAL_EACH} 3")
     )
     too_few = "Too few wearers for figures to report. " if settings.wearers < _FEWEST else ""
     return Report(
         title="Calibration methods compared",
-        subject=f"{settings.wearers} simulated wearers, {len(_methods(rows))} methods",
+        subject=f"{settings.wearers} simulated wearers, {len(_methods(errors))} methods",
         lead=f"{too_few}Mean reprojection error: the paper's method {paper:.1f} arcmin; "
         f"handcal {one:.1f} with one alignment, {three:.1f} with three, and {each:.1f} with three "
         "of each eye.",
-        sections=list(_sections(settings, rows)),
+        sections=list(_sections(settings, rows, errors)),
     )
 
 
-def _sections(settings: MethodSettings, rows: Sequence[StudyRow]) -> Iterator[Section]:
+def _sections(
+    settings: MethodSettings, rows: Sequence[StudyRow], errors: ErrorTable
+) -> Iterator[Section]:
     yield Section("", [facts(made_with()), _MODEL, _TIME, _REFUSED])
     for sigma_m in settings.eye_distance_sigmas_m:
-        found = _population(rows, sigma_m)
+        is_of = _is_population(errors, sigma_m)
         title = f"Eye distances that vary by {1e3 * sigma_m:g} mm"
         yield Section(
             title if sigma_m else "Headset set to the wearer's eye distance",
             [
-                _reprojection_table(found),
-                _figure(found, f"reprojection-{1e3 * sigma_m:g}mm".replace(".", "-")),
-                _misalignment_table(found),
+                _reprojection_table(errors[is_of]),
+                _figure(
+                    errors[is_of],
+                    [row for row, is_shown in zip(rows, is_of, strict=True) if is_shown],
+                    f"reprojection-{1e3 * sigma_m:g}mm".replace(".", "-"),
+                ),
+                _misalignment_table(errors[is_of]),
             ],
         )
     if len(settings.eye_distance_sigmas_m) > 1 and settings.eye_distance_sigmas_m[0] == 0.0:
-        yield _eye_distance(settings, rows)
+        yield _eye_distance(settings, errors)
     yield _published()
     yield Section("Settings", settings_items(asdict(settings), "study.json"))
 
 
-def _reprojection_table(rows: Sequence[StudyRow]) -> Table:
+def _reprojection_table(errors: ErrorTable) -> Table:
     columns = [Column("method", "left")] + [
         Column(title)
         for title in (
@@ -86,17 +109,17 @@ def _reprojection_table(rows: Sequence[StudyRow]) -> Table:
         )
     ]
     cells = []
-    for name in _methods(rows):
-        of = _of(rows, name)
-        judged = [row for row in of if not row["refused"]]
-        refused = (len(of) - len(judged)) // len(TARGET_DEPTHS_M)
-        start = [name, str(of[0]["alignments"]), f"{of[0]['wearer_s']:.0f}", str(refused)]
-        if len({row["wearer"] for row in judged}) < 2:
+    for name in _methods(errors):
+        of_method = errors[errors["method"] == name]
+        judged = of_method[~of_method["refused"]]
+        refused = (len(of_method) - len(judged)) // len(TARGET_DEPTHS_M)
+        first = of_method[0]
+        start = [name, str(first["alignments"]), f"{first['wearer_s']:.0f}", str(refused)]
+        if len(set(judged["wearer"])) < 2:
             cells.append([*start, *["–"] * 6])
             continue
-        errors = _arcmin(judged)
-        spread = summarise(errors.ravel())
-        mean = mean_interval(errors.mean(axis=1), [row["wearer"] for row in judged])
+        spread = summarise(judged["arcmin"].ravel())
+        mean = mean_interval(judged["arcmin"].mean(axis=1), judged["wearer"].tolist())
         cells.append(
             [
                 *start,
@@ -111,32 +134,38 @@ def _reprojection_table(rows: Sequence[StudyRow]) -> Table:
     return Table(columns, cells, "Reprojection error over all corners, eyes and distances.")
 
 
-def _misalignment_table(rows: Sequence[StudyRow]) -> Table:
+def _misalignment_table(errors: ErrorTable) -> Table:
     columns = [Column("method", "left")] + [
         Column(f"{axis} at {depth_m} m, mm") for depth_m in TARGET_DEPTHS_M for axis in "xyz"
     ]
     cells = []
-    for name in _methods(rows):
-        judged = [row for row in _of(rows, name) if not row["refused"]]
+    judged = errors[~errors["refused"]]
+    for name in _methods(errors):
+        of_method = judged[judged["method"] == name]
+        at_depths = [of_method[of_method["depth_m"] == depth_m] for depth_m in TARGET_DEPTHS_M]
         means = [
-            _numbers(judged, f"{axis}_mm", depth_m).mean() if judged else np.nan
-            for depth_m in TARGET_DEPTHS_M
-            for axis in "xyz"
+            at_depth["mm"][:, axis].mean() if len(at_depth) else np.nan
+            for at_depth in at_depths
+            for axis in range(3)
         ]
         cells.append([name, *(f"{mean:.2f}" if np.isfinite(mean) else "–" for mean in means)])
     return Table(columns, cells, "Misalignment in space.")
 
 
-def _eye_distance(settings: MethodSettings, rows: Sequence[StudyRow]) -> Section:
+def _eye_distance(settings: MethodSettings, errors: ErrorTable) -> Section:
     """Compare the errors that a varying eye distance causes, by method, with the prediction."""
     sigma_m = settings.eye_distance_sigmas_m[1]
     depth_m = TARGET_DEPTHS_M[1]
     columns = [Column("method", "left"), Column("rms, set, arcmin"), Column("rms, varying, arcmin")]
     columns.append(Column("cost, arcmin"))
     cells = []
-    for name in [name for name in _methods(rows) if name.startswith((HANDCAL_BOTH, HANDCAL_EACH))]:
+    at_depth = errors[~errors["refused"] & (errors["depth_m"] == depth_m)]
+    for name in _methods(errors):
+        if not name.startswith((HANDCAL_BOTH, HANDCAL_EACH)):
+            continue
+        of_method = at_depth[at_depth["method"] == name]
         before, after = (
-            float(np.sqrt(np.mean(_arcmin(_at(_of(_population(rows, s), name), depth_m)) ** 2)))
+            float(np.sqrt(np.mean(of_method[_is_population(of_method, s)]["arcmin"] ** 2)))
             for s in (settings.eye_distance_sigmas_m[0], sigma_m)
         )
         cost = np.copysign(np.sqrt(abs(after**2 - before**2)), after - before)
@@ -183,23 +212,23 @@ def _published() -> Section:
     )
 
 
-def _figure(rows: Sequence[StudyRow], name: str) -> Figure:
+def _figure(errors: ErrorTable, rows: Sequence[StudyRow], name: str) -> Figure:
     return Figure(
         name,
         "Boxes: quartiles and median over all corners; whiskers: 5th and 95th percentile.",
-        partial(_draw, rows),
+        partial(_draw, errors),
         rows,
-        height_mm=_FIGURE_MM + _ROW_MM * len(_methods(rows)),
+        height_mm=_FIGURE_MM + _ROW_MM * len(_methods(errors)),
         left_mm=_NAMES_MM,
     )
 
 
-def _draw(rows: Sequence[StudyRow], axes: Sequence[Axes]) -> None:
+def _draw(errors: ErrorTable, axes: Sequence[Axes]) -> None:
     (ax,) = axes
-    names = _methods(rows)
-    errors = [_arcmin(_of(rows, name)) for name in names]
+    names = _methods(errors)
+    judged = errors[~errors["refused"]]
     ax.boxplot(
-        [values.ravel() for values in errors],
+        [judged[judged["method"] == name]["arcmin"].ravel() for name in names],
         positions=range(len(names)),
         orientation="horizontal",
         widths=0.6,
@@ -213,27 +242,21 @@ def _draw(rows: Sequence[StudyRow], axes: Sequence[Axes]) -> None:
     name_axes(ax, "reprojection error", "arcmin", "")
 
 
-def _methods(rows: Sequence[StudyRow]) -> list[str]:
-    return list(dict.fromkeys(str(row["method"]) for row in rows))
+def _error_table(rows: Sequence[StudyRow]) -> ErrorTable:
+    """Return the rows as a structured array; errors are NaN where a method refused."""
+    cells = []
+    for row in rows:
+        arcmin, mm = (
+            tuple(np.nan if row["refused"] else row[name] for name in names)
+            for names in (ARCMIN_COLUMNS, _MM_COLUMNS)
+        )
+        cells.append((*(row[name] for name in _NUMBERS), arcmin, mm))
+    return np.array(cells, _COLUMNS)
 
 
-def _population(rows: Sequence[StudyRow], sigma_m: float) -> list[StudyRow]:
-    return [row for row in rows if row["eye_distance_sigma_mm"] == 1e3 * sigma_m]
+def _methods(errors: ErrorTable) -> list[str]:
+    return list(dict.fromkeys(errors["method"].tolist()))
 
 
-def _of(rows: Sequence[StudyRow], name: str) -> list[StudyRow]:
-    return [row for row in rows if row["method"] == name]
-
-
-def _at(rows: Sequence[StudyRow], depth_m: float) -> list[StudyRow]:
-    return [row for row in rows if row["depth_m"] == depth_m]
-
-
-def _arcmin(rows: Sequence[StudyRow]) -> Float64:
-    """Return (N, 8) errors of the rows that are not refused: each eye's four corners."""
-    errors = [[row[name] for name in ARCMIN_COLUMNS] for row in rows if not row["refused"]]
-    return np.array(errors, dtype=np.float64).reshape(-1, len(ARCMIN_COLUMNS))
-
-
-def _numbers(rows: Sequence[StudyRow], name: str, depth_m: float) -> Float64:
-    return np.array([row[name] for row in _at(rows, depth_m)], dtype=np.float64)
+def _is_population(errors: ErrorTable, sigma_m: float) -> Bool:
+    return np.asarray(errors["eye_distance_sigma_mm"] == 1e3 * sigma_m)

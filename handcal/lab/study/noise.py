@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from handcal.core.types import EYES, METHODS, Float64, Intrinsics, Method
+from handcal.core.types import EYES, METHODS, EyeShift, Float64, Intrinsics, Method
 from handcal.lab.study.run import Case, Study
 from handcal.lab.study.store import StudyRow
 from handcal.lab.study.trials import floor_error_m, solve_by_paper, solve_trial, study_hand
@@ -244,15 +244,25 @@ def _solve(
 ) -> _Solved:
     made = simulate_alignment(rng, study_hand(hand), np.radians(angle_deg), scenario, _CAMERA)
     yield FLOOR, 0, floor_error_m(made, exact=scenario.exact)
+    clouds = made.cursor_m, made.hand_m, made.T_E_W, made.display_distance_m
+    yield from _by_each(methods, clouds, made.shift_m, lambda method: solve_trial(made, method))
+
+
+def _by_each(
+    methods: Sequence[Method],
+    clouds: tuple[Float64, Float64, Float64, float],
+    true_m: Float64,
+    solve: Callable[[Method], EyeShift],
+) -> _Solved:
+    """Solve by each method; `clouds` are those of `solve`. The paper's method has two results."""
     for method in methods:
         if method == "paper":
-            clouds = made.cursor_m, made.hand_m, made.T_E_W, made.display_distance_m
             iterations, shifts_m = solve_by_paper(*clouds)
             for name, shift_m in shifts_m.items():
-                yield name, iterations, shift_m - made.shift_m
-            continue
-        found = solve_trial(made, method)
-        yield method, found.iterations, found.shift_m - made.shift_m
+                yield name, iterations, shift_m - true_m
+        else:
+            solved = solve(method)
+            yield method, solved.iterations, solved.shift_m - true_m
 
 
 def _solve_wearer(
@@ -280,12 +290,10 @@ def _solve_wearer(
             error_scale * drawn.depth_ratio,
         ),
     )
-    for method in methods:
-        if method == "paper":
-            clouds = alignment.cursor_m, alignment.hand_m, alignment.T_E_W[eye]
-            iterations, shifts_m = solve_by_paper(*clouds, rig.eyes[eye].z_C0_S_m)
-            for name, shift_m in shifts_m.items():
-                yield name, iterations, shift_m - true_m
-            continue
-        found = solve_alignment(alignment, rig, method)[eye]
-        yield method, found.iterations, found.shift_m - true_m
+    cursor_m, hand_m, T_E_W = alignment.cursor_m, alignment.hand_m, alignment.T_E_W[eye]
+    yield from _by_each(
+        methods,
+        (cursor_m, hand_m, T_E_W, rig.eyes[eye].z_C0_S_m),
+        true_m,
+        lambda method: solve_alignment(alignment, rig, method)[eye],
+    )

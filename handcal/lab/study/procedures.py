@@ -14,13 +14,13 @@ from typing import Any, cast
 
 import numpy as np
 
-from handcal.core.display import TARGET_DEPTHS_M, arcmin_from_px, eye_projection, target_corners_m
+from handcal.core.display import TARGET_DEPTHS_M, arcmin_from_px, target_corners_m
 from handcal.core.errors import HandcalError
 from handcal.core.geometry import invert, project, transform
 from handcal.core.progress import Progress
 from handcal.core.types import EYES, CameraIdentity, DepthEdges, Eye, Float64
 from handcal.hand.edges import edges_of
-from handcal.lab.methods.spaam import solve_spaam
+from handcal.lab.methods import solve_spaam
 from handcal.lab.settings import ProcedureStudySettings
 from handcal.lab.study.procedure_trial import Calibrated, ProcedureModel, lead_through
 from handcal.lab.study.run import Case, Study
@@ -188,7 +188,7 @@ def procedure_trial(settings: ProcedureSettings, case: Case) -> list[StudyRow]:
     number, plan, scale = int(case["wearer"]), str(case["plan"]), float(case["scale"])
     wearer = _wearer(settings, number)
     rng = np.random.default_rng([settings.seed, number, 1])
-    offline = {eye: _rendered(wearer, eye, np.zeros(3)) for eye in EYES}
+    offline = {eye: wearer.projection(eye, np.zeros(3)) for eye in EYES}
     if plan.startswith("spaam"):
         count = _spaam_count(plan)
         found = _by_spaam(rng, wearer, count, scale)
@@ -203,7 +203,7 @@ def procedure_trial(settings: ProcedureSettings, case: Case) -> list[StudyRow]:
     calibrated = _calibrate(rng, settings, wearer, plan, cast("Variant", case["variant"]), scale)
     return [
         case
-        | _errors(wearer, eye, offline[eye], _rendered(wearer, eye, calibrated.shift_m[eye]))
+        | _errors(wearer, eye, offline[eye], wearer.projection(eye, calibrated.shift_m[eye]))
         | {"eye": eye, "seconds": calibrated.seconds}
         | _told(calibrated, eye)
         | _depth_errors(wearer, eye, calibrated.shift_m[eye])
@@ -328,11 +328,6 @@ def _with_camera(
     return replace(wearer, rig=replace(typical, depth_edges=edges)), seen_with(
         model.sensor, fatten_for(border_px)
     )
-
-
-def _rendered(wearer: StudyWearer, eye: Eye, shift_m: Float64) -> Float64:
-    """Return the projection (3, 4) from H with a φ."""
-    return eye_projection(wearer.rig.eyes[eye], shift_m) @ wearer.T_E_H(eye)
 
 
 def _errors(

@@ -20,9 +20,13 @@ from handcal.core.display import arcmin_from_px
 from handcal.core.errors import FileError
 from handcal.core.geometry import project
 from handcal.core.types import EyeDisplay, Float64
-from handcal.lab.methods.fingertip import solve_eye_from_points
-from handcal.lab.methods.indica import solve_indica_full, solve_indica_recycled, split_projection
-from handcal.lab.methods.spaam import solve_spaam
+from handcal.lab.methods import (
+    solve_eye_from_points,
+    solve_indica_full,
+    solve_indica_recycled,
+    solve_spaam,
+    split_projection,
+)
 
 BASE = "Base"
 _LARGEST_BYTES = 1_000_000

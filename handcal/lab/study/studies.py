@@ -17,7 +17,13 @@ from handcal.lab.settings import (
     ProcedureStudySettings,
     output_folder,
 )
-from handcal.lab.study.methods import QUICK_METHODS, MethodSettings, methods_study
+from handcal.lab.study.methods import (
+    QUICK_METHODS,
+    MethodSettings,
+    NoiseFit,
+    fit_noise,
+    methods_study,
+)
 from handcal.lab.study.methods_report import methods_report
 from handcal.lab.study.noise import QUICK_NOISE, NoiseSettings, noise_study
 from handcal.lab.study.noise_report import noise_report
@@ -31,7 +37,6 @@ from handcal.lab.study.procedures import (
 from handcal.lab.study.run import Study, resumable, run_study
 from handcal.lab.study.store import StudyRow
 from handcal.lab.study.trials import BEST_ITERATE
-from handcal.lab.study.wearer_noise import NoiseFit, fit_noise
 from handcal.report.document import Report
 from handcal.report.write import write_report
 from handcal.sim.people import Variant

@@ -47,9 +47,13 @@ class StudyWearer:
         """Return the transform from the headset to an eye's E."""
         return view_of_eye(self.rig.eyes[eye], np.eye(4))
 
+    def projection(self, eye: Eye, shift_m: Float64) -> Float64:
+        """Return the rig's projection (3, 4) for an eye shift φ: pixels from points in H."""
+        return eye_projection(self.rig.eyes[eye], shift_m) @ self.T_E_H(eye)
+
     def true_projection(self, eye: Eye) -> Float64:
-        """Return the true projection (3, 4) of an eye: pixels from points in H."""
-        return eye_projection(self.rig.eyes[eye], self.true_shift_m[eye]) @ self.T_E_H(eye)
+        """Return the projection (3, 4) that the wearer needs."""
+        return self.projection(eye, self.true_shift_m[eye])
 
     def eye_m(self, eye: Eye) -> Float64:
         """Return the position of an eye in H."""

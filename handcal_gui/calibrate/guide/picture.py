@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib.metadata import version
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QPagedPaintDevice, QTextDocument
@@ -29,7 +30,7 @@ from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.printing import ask_printer
 from handcal_gui.widgets.result_rows import EYE_NAMES
-from handcal_gui.widgets.times import local_time
+from handcal_gui.widgets.session_rows import session_facts
 
 _BLINK_MS = 800
 _LEAST_PX = 80, 48
@@ -230,7 +231,7 @@ class ResultBar(QWidget):
 def _head(record: SessionRecord) -> Mapping[str, str]:
     return {
         tr("Wearer"): record.wearer or tr("without a name"),
-        tr("Started"): local_time(record.events[0].time),
-        tr("Rig"): record.rig.name,
         tr("Session"): record.path.name,
-    } | ({tr("Simulated"): record.simulated} if record.simulated else {})
+        **session_facts(record),
+        tr("Made with"): f"handcal {version('handcal')}",
+    }

@@ -13,7 +13,7 @@ from handcal.hand.settings import Roi
 from handcal.station.checks.doctor import Finding
 from handcal_gui.app.theme import SPACING_PX, scale_font
 from handcal_gui.app.translation import tr
-from handcal_gui.widgets.bound import Bound
+from handcal_gui.widgets.entries_form import Bound
 from handcal_gui.widgets.fields import choice, label_for, number
 from handcal_gui.widgets.finding_line import FindingLine
 

@@ -37,7 +37,7 @@ from handcal_gui.app.translation import tr
 from handcal_gui.calibrate.start.calibration_fields import CalibrationFields
 from handcal_gui.calibrate.start.camera_settings import CameraSettingsDialog
 from handcal_gui.connect.key_field import KeyField
-from handcal_gui.widgets.bound import Bound
+from handcal_gui.widgets.entries_form import Bound
 from handcal_gui.widgets.fields import (
     button,
     choice,

@@ -1,4 +1,4 @@
-"""From the first window to the main one: nothing typed meanwhile is lost or presses a button."""
+"""From the first window to the main one."""
 
 from __future__ import annotations
 
@@ -9,17 +9,14 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from PySide6.QtCore import QCoreApplication, QEvent, QObject, QSize, Qt, QTimer
-from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QApplication, QComboBox, QWidget
+from PySide6.QtCore import QSize
+from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.app import launch
 from handcal_gui.app.preferences import PreferencesFile
 from handcal_gui.app.program import Program
-from handcal_gui.calibrate.start.start_page import StartPage
 from handcal_gui.calibrate.window import MainWindow
-from tests.gui.helpers import child
 
 
 @pytest.fixture
@@ -52,42 +49,6 @@ def first(qtbot: QtBot) -> QWidget:
     return first
 
 
-def test_text_typed_while_it_starts_goes_to_the_wearers_name_and_no_other_key_does_anything(
-    qapp: QApplication, first: QWidget, arguments: Namespace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    keys = Qt.Key
-    for key, text in (
-        *((keys.Key_Space, " "), (keys.Key_A, "a"), (keys.Key_X, "x"), (keys.Key_Backspace, "")),
-        *((keys.Key_Tab, "\t"), (keys.Key_D, "d"), (keys.Key_Return, "\r"), (keys.Key_A, "a")),
-    ):
-        event = QKeyEvent(QEvent.Type.KeyPress, key, Qt.KeyboardModifier.NoModifier, text)
-        QCoreApplication.postEvent(first.windowHandle(), event)  # handled once all is imported
-    seen = []
-
-    def look() -> None:
-        window = next(one for one in qapp.topLevelWidgets() if isinstance(one, MainWindow))
-        wearer = child(child(window, StartPage), QComboBox, "wearer")
-        seen.append((wearer.currentText(), window.page, first.isVisible()))
-
-    monkeypatch.setattr(qapp, "exec", look)
-    launch.launch(qapp, arguments, first)
-    assert seen == [("ada", "start", False)]
-
-
-def test_a_window_closed_before_the_event_loop_begins_ends_the_program(
-    qapp: QApplication, first: QWidget, arguments: Namespace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """As a signal does whose event is handled while keys typed at the start are read."""
-    monkeypatch.setattr(
-        launch, "close_on_signals", lambda window, _: QTimer.singleShot(0, window.close)
-    )
-    entered = []
-    monkeypatch.setattr(qapp, "exec", lambda: entered.append(True))
-    launch.launch(qapp, arguments, first)
-    assert not entered
-    assert arguments.preferences.exists()
-
-
 def test_a_size_is_that_of_the_window_although_it_was_maximized_when_closed(
     qapp: QApplication, first: QWidget, arguments: Namespace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -107,29 +68,6 @@ def test_a_size_is_that_of_the_window_although_it_was_maximized_when_closed(
     monkeypatch.setattr(qapp, "exec", look)
     launch.launch(qapp, arguments, first)
     assert seen == [(False, arguments.size)]
-
-
-class _Windows(QObject):
-    """Names the windows that are shown, over all of the application."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.shown: list[str] = []
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() is QEvent.Type.Show and isinstance(watched, QWidget) and watched.isWindow():
-            self.shown.append(watched.objectName() or type(watched).__name__)
-        return False
-
-
-def test_no_part_of_the_window_is_shown_before_it(qtbot: QtBot, tmp_path: Path) -> None:
-    windows, app = _Windows(), QApplication.instance()
-    assert app is not None
-    app.installEventFilter(windows)
-    program = Program(PreferencesFile(tmp_path / "preferences.json"))
-    app.removeEventFilter(windows)
-    qtbot.addWidget(program.window)
-    assert windows.shown == []
 
 
 @pytest.mark.process

@@ -96,13 +96,6 @@ def test_one_manual_shows_every_page_asked_for_and_a_missing_one_is_an_error(
         show_manual(window, "docs/none.md")
 
 
-def test_functions_are_named_with_where_they_are_described(manual: Manual) -> None:
-    manual.open_page("docs/api.md")
-    text = manual.page.toPlainText()
-    assert "handcal.solve, described by help(handcal.solve) in Python" in text
-    assert ":::" not in text
-
-
 @pytest.mark.parametrize("name", ["guide.md", "rig-guide.md"])
 def test_the_guides_are_for_technicians(name: str) -> None:
     text = (ROOT / "docs" / name).read_text("utf-8")

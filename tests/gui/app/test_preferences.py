@@ -13,7 +13,6 @@ from PySide6.QtCore import QStandardPaths
 from handcal.calibration.states import CalibrationSettings
 from handcal.core.errors import FileError
 from handcal.export.export import ExportSettings
-from handcal.lab.settings import MethodComparisonSettings, NoiseStudySettings
 from handcal.register.guard import GuardSettings
 from handcal.station.settings import StationSettings
 from handcal_gui.app.preferences import (
@@ -22,7 +21,6 @@ from handcal_gui.app.preferences import (
     Preferences,
     PreferencesFile,
 )
-from handcal_gui.evaluate.entries import CubeEntries, EvaluationEntries, UserEntries
 
 CHANGED = Preferences(
     station=StationSettings(
@@ -94,46 +92,6 @@ def test_another_version_is_refused_and_kept(
     assert "\n" not in said
     assert f"preferences.version is {version!r}, not 4" in caplog.text
     assert file.path.with_name("preferences.json.bad").read_text() == stored
-
-
-def test_entries_of_evaluations_that_are_not_given_have_defaults(file: PreferencesFile) -> None:
-    file.path.parent.mkdir()
-    study = {"seed": 3, "processes": 2, "scheduler": "tcp://host:1"}
-    evaluation = {
-        "noise": {"size": "quick", **study, "output": "/n"},
-        "methods": {"wearers": 12, **study, "output": "/m"},
-        "cube": {
-            "captures": "/captures",
-            "cube": "/cube.json",
-            "camera": "/camera.json",
-            "rig": "/rig.yaml",
-            "eye": "right",
-            "square_px": 60,
-            "seed": 5,
-            "output": "/c",
-            "positions": "centre, up",
-            "poses": 2,
-            "drawn": "before, after",
-            "with_grid": False,
-        },
-        "users": {"sessions": "/sessions", "output": "/u"},
-    }
-    file.path.write_text(json.dumps({"version": 4, "evaluation": evaluation}))
-    preferences, problem = file.load()
-    assert problem == ""
-    assert preferences.evaluation == EvaluationEntries(
-        NoiseStudySettings("quick", 3, 2, "tcp://host:1", "/n"),
-        MethodComparisonSettings(12, 3, 2, "tcp://host:1", "/m"),
-        CubeEntries(
-            *("/captures", "/cube.json", "/camera.json", "/rig.yaml", "right", 60, 5, "/c", 2),
-            positions="centre, up",
-            drawn="before, after",
-            with_grid=False,
-        ),
-        UserEntries("/sessions", "/u"),
-    )
-    file.save(preferences)
-    assert file.load() == (preferences, "")
 
 
 @pytest.mark.parametrize(

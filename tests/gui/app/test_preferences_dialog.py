@@ -132,36 +132,6 @@ def test_a_gate_without_room_for_a_hand_is_refused_beside_it(opened: Preferences
     assert not found.isVisible()
 
 
-def test_a_folder_that_cannot_be_created_is_refused_beside_it(
-    opened: PreferencesDialog, qtbot: QtBot, tmp_path: Path
-) -> None:
-    field, found = child(opened, PathField), child(opened, QLabel, "sessionsFound")
-    (tmp_path / "file").touch()
-    field.set_path(str(tmp_path / "file" / "folder"))
-    opened.accept()  # at once: it waits for the check
-    qtbot.waitUntil(found.isVisible)
-    qtbot.waitUntil(lambda: not found.visibleRegion().isEmpty())
-    assert "is a file. Choose a folder." in found.text()
-    assert opened.isVisible()
-    assert not _button(opened, "Ok").isEnabled()
-    field.set_path(str(tmp_path / "new"))
-    opened.accept()
-    qtbot.waitUntil(lambda: not opened.isVisible())
-    assert opened.result() == QDialog.DialogCode.Accepted
-    assert opened.preferences().station.sessions == str(tmp_path / "new")
-
-
-def test_a_folder_that_is_gone_lets_other_preferences_change(qtbot: QtBot, tmp_path: Path) -> None:
-    (tmp_path / "file").touch()
-    gone = replace(BEFORE.station, sessions=str(tmp_path / "file" / "folder"))
-    dialog = PreferencesDialog(replace(BEFORE, station=gone))
-    qtbot.addWidget(dialog)
-    dialog.show()
-    qtbot.waitUntil(child(dialog, QLabel, "sessionsFound").isVisible)
-    dialog.accept()
-    qtbot.waitUntil(lambda: not dialog.isVisible())
-
-
 def test_defaults_are_shown_and_taken_only_by_ok(opened: PreferencesDialog) -> None:
     before = opened.preferences()
     child(opened, QDoubleSpinBox, "target").setValue(3.0)

@@ -361,7 +361,7 @@ def resume_and_quit(display: Display, session: Path, preferences: Path) -> None:
         window.end_well()
 
 
-@pytest.mark.slow  # tests/gui/app/autopilot/test_demonstration.py covers all but the X server
+@pytest.mark.slow  # tests/gui/app/test_autopilot.py covers all but the X server
 def test_the_autopilot_calibrates_exports_and_takes_pictures(
     display: Display, tmp_path: Path, preferences: Path
 ) -> None:
@@ -372,7 +372,7 @@ def test_the_autopilot_calibrates_exports_and_takes_pictures(
         *("--screenshots", pictures, "--preferences", preferences),
     ) as window:
         window.end_well()
-    assert len(list((tmp_path / "result").glob("*-export/report.pdf"))) == 1
+    assert len(list((tmp_path / "result").glob("*/report.pdf"))) == 1
     names = {path.stem for path in pictures.glob("*.png")}
     assert {f"step-{i}" for i in range(1, 8)} <= {name[:6] for name in names}
     assert {"panel-camera", "panel-results", "panel-fine-tune", "panel-session"} <= names

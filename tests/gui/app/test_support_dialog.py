@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from PySide6.QtWidgets import QLabel, QPushButton
+from PySide6.QtWidgets import QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal.station.checks import support
@@ -27,24 +27,21 @@ def test_the_dialog_writes_a_bundle(
     folder, write = dialog.findChildren(PathField)[0], child(dialog, QPushButton, "writeBundle")
     folder.set_path("")
     assert not write.isEnabled(), "or it would be written wherever the program was started"
-    assert text(dialog, "supportFound") == "Choose the folder to write to."
     (tmp_path / "file").touch()
     folder.set_path(str(tmp_path / "file"))
-    qtbot.waitUntil(lambda: "is a file: choose a folder" in text(dialog, "supportFound"))
-    assert not write.isEnabled()
+    write.click()
+    qtbot.waitUntil(lambda: "choose another folder" in text(dialog, "supportFound"))
     folder.set_path(str(tmp_path))
-    qtbot.waitUntil(lambda: not child(dialog, QLabel, "supportFound").isVisible())
-    qtbot.waitUntil(write.isEnabled)
     write.click()
     assert not folder.isEnabled(), "or another would not be checked"
     qtbot.waitUntil(lambda: "was written" in text(dialog, "supportFound"), timeout=10_000)
-    assert folder.isEnabled()
+    qtbot.waitUntil(folder.isEnabled)
     [written] = tmp_path.glob("handcal-support-*.zip")
     assert f"The file {written.name} will be written" in announced
     dialog.stop()
 
 
-def test_a_failure_says_what_to_do_and_cuts_nothing_off(qtbot: QtBot, tmp_path: Path) -> None:
+def test_a_failure_says_what_to_do(qtbot: QtBot, tmp_path: Path) -> None:
     dialog = SupportDialog(SupportSettings(tmp_path), tmp_path)
     qtbot.addWidget(dialog)
     dialog.show()
@@ -54,7 +51,4 @@ def test_a_failure_says_what_to_do_and_cuts_nothing_off(qtbot: QtBot, tmp_path: 
     qtbot.waitUntil(write.isEnabled)
     write.click()
     qtbot.waitUntil(lambda: "choose another folder" in text(dialog, "supportFound"))
-    layout = dialog.layout()
-    assert layout is not None
-    qtbot.waitUntil(lambda: dialog.height() >= layout.totalHeightForWidth(dialog.width()))
     dialog.stop()

@@ -9,14 +9,13 @@ from typing import ClassVar, Literal
 
 import numpy as np
 import pytest
-from PySide6.QtGui import QAction, QColor, QGuiApplication, QIcon, QPalette
+from PySide6.QtGui import QColor, QGuiApplication, QIcon, QPalette
 from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.core.types import Float64
 from handcal_gui.app.theme import colors, follow_theme, icon, is_dark, use_theme
 from handcal_gui.calibrate.parts.residual_scale import OUTLIER, residual_ramp
-from handcal_gui.widgets.fields import tool_button
 
 
 @pytest.fixture
@@ -53,28 +52,6 @@ def test_dark_is_dark_and_gives_way_again() -> None:
     assert not is_dark()
     assert QGuiApplication.palette() == before
     assert middle(icon("check")).lightness() < 128
-
-
-@pytest.mark.usefixtures("themes")
-def test_a_button_with_a_style_sheet_follows_the_theme(qtbot: QtBot) -> None:
-    use_theme("light")
-    window = QWidget()
-    made = tool_button(QAction())
-    made.setParent(window)  # Qt tells only windows of another palette
-    qtbot.addWidget(window)
-    window.show()
-
-    def follows() -> bool:
-        return made.palette().button().color() == QGuiApplication.palette().button().color()
-
-    for theme in ("dark", "light", "contrast"):
-        use_theme(theme)
-        qtbot.waitUntil(follows)
-
-
-def test_an_icon_takes_a_colour_with_a_meaning(qtbot: QtBot) -> None:
-    red = middle(icon("check", "#ff0000"))
-    assert (red.red(), red.green(), red.blue()) == (255, 0, 0)
 
 
 @pytest.mark.usefixtures("themes")

@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from PySide6.QtCore import Qt
-from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel, QLineEdit, QPushButton
+from PySide6.QtWidgets import QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.app.manual import Manual
@@ -40,14 +38,6 @@ def test_the_start_page_leads_to_evaluations(qtbot: QtBot, tmp_path: Path) -> No
     shown = manual.page.textCursor().block().text()
     assert shown == "handcal evaluate segmentation"
     window.show_page("noise")
-    scheduler = child(window.page, QLineEdit, "scheduler")
-    window.activateWindow()
-    scheduler.setFocus()
-    qtbot.waitUntil(scheduler.hasFocus)
-    QTest.keyClick(scheduler, Qt.Key.Key_U, Qt.KeyboardModifier.AltModifier)
-    QTest.keyClick(scheduler, Qt.Key.Key_V)
-    assert scheduler.text() == "v", "Alt+U leads nowhere, and types nothing"
-    scheduler.clear()
     window.page.form.enter(seed=11)
     program.window.close()
     assert not window.isVisible()

@@ -213,11 +213,9 @@ def test_each_page_has_one_main_button_and_keys(qtbot: QtBot) -> None:
     for name in make_specs():
         window.show_page(name)
         QApplication.processEvents()
-        assert window.height() == 510
         (main,) = (one for one in window.findChildren(MainButton) if one.isVisible())
         buttons = [one for one in window.findChildren(QPushButton) if one.isVisible()]
         assert [one for one in buttons if one.isDefault()] == [main]
-        assert main.mapTo(window, main.rect().center()).y() > 440, "at the bottom"
         found = [*letters(window.page), "o"]  # of hidden buttons, too, and of Close
         assert len(set(found)) == len(found)
         assert all("&" in label.text() for label in window.page.form.findChildren(QLabel))

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal.core.progress import Progress
-from handcal.lab.evaluate.run import UserTestRun
+from handcal.lab.evaluate.user_test import UserTestRun
 from handcal.report.document import Report
 from handcal.report.write import write_report
 from handcal_gui.evaluate.entries import EvaluationEntries, UserEntries

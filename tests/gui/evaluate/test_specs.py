@@ -6,7 +6,6 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
-from PySide6.QtWidgets import QSpinBox
 from pytestqt.qtbot import QtBot
 
 from handcal.core.errors import FileError
@@ -46,16 +45,6 @@ def test_every_form_shows_and_returns_its_entries(qtbot: QtBot) -> None:
         qtbot.addWidget(form)
         form.show_entries(getattr(entries, name))
         assert form.take(getattr(EvaluationEntries(), name)) == getattr(entries, name)
-
-
-def test_each_says_what_it_will_show_and_its_numbers_are_equally_wide(qtbot: QtBot) -> None:
-    specs = make_specs().values()
-    assert len({spec.coming for spec in specs}) == len(specs)
-    for spec in specs:
-        assert "will be shown here" in spec.coming
-        form = spec.form()
-        qtbot.addWidget(form)
-        assert len({one.minimumWidth() for one in form.findChildren(QSpinBox)}) <= 1
 
 
 def test_what_cannot_be_prepared_yet_says_what_to_enter_first() -> None:

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint
 from PySide6.QtWidgets import QComboBox, QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
@@ -28,7 +27,7 @@ from handcal_gui.evaluate.entries import CubeEntries
 from handcal_gui.evaluate.track_dialog import TrackDialog
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.table import Table
-from tests.gui.helpers import child, letters
+from tests.gui.helpers import child
 
 Make = Callable[..., TrackDialog]
 
@@ -85,11 +84,8 @@ def test_the_simulated_cube_is_shown_with_its_pose_until_stopped(qtbot: QtBot, m
     start, stop = button(dialog, "start"), button(dialog, "cancel")
     first, move = (child(dialog, QLabel, name) for name in ("trackStart", "trackMove"))
     assert first.isVisible()
-    assert first.mapTo(dialog, QPoint()).y() < dialog.form.y(), "at the top"
-    top_px = dialog.form.y()
     start.click()
     assert move.isVisible()
-    assert dialog.form.y() == top_px
     assert not start.isEnabled()
     assert stop.text() == "S&top"
     table = child(dialog, Table, "pose-of-the-cube")
@@ -143,10 +139,8 @@ def test_a_headset_is_paired_once_its_key_is_stored(
     assert not devices.pairing_problem()
 
 
-def test_before_a_cube_is_seen_there_is_no_empty_table_and_nothing_is_cut(make: Make) -> None:
+def test_before_a_cube_is_seen_there_is_no_empty_table(make: Make) -> None:
     dialog = make("network", track_cube)
-    chosen = child(dialog, QComboBox, "trackedBy")
-    assert chosen.width() >= chosen.sizeHint().width()
     assert not child(dialog, Table, "pose-of-the-cube").isVisible()
     assert "will be shown here" in child(dialog, ImageView).message
 
@@ -163,11 +157,6 @@ def test_the_failure_of_a_camera_is_shown_and_it_can_be_started_again(
     button(dialog, "start").click()
     qtbot.waitUntil(lambda: "RealSense camera is connected" in finding(dialog), timeout=60_000)
     qtbot.waitUntil(button(dialog, "start").isEnabled, timeout=60_000)
-
-
-def test_every_field_has_a_letter_of_its_own(make: Make) -> None:
-    found = letters(make("virtual", track_cube))
-    assert len(set(found)) == len(found) == 3
 
 
 def test_closing_stops_a_tracker_that_does_not_end_by_itself(qtbot: QtBot, make: Make) -> None:

@@ -26,7 +26,6 @@ from handcal.station.user_test.cube_trials import StudyLeader, TrialOrder
 from handcal_gui.evaluate.entries import UserEntries
 from handcal_gui.evaluate.trials_dialog import STEP_M, TrialsDialog
 from handcal_gui.widgets.table import Table
-from tests.gui.helpers import letters
 from tests.helpers import ROOT
 
 Kind = TypeVar("Kind", bound=QWidget)
@@ -133,13 +132,6 @@ def test_a_failure_is_shown_and_trials_can_be_started_again(
     found = part(dialog, QLabel, "trialsFound")
     qtbot.waitUntil(lambda: "did not come to rest" in found.text(), timeout=20_000)
     qtbot.waitUntil(start.isEnabled, timeout=20_000)
-
-
-def test_every_field_has_a_letter_of_its_own(
-    make: Callable[[Recorder], TrialsDialog],
-) -> None:
-    found = letters(make(Recorder()))
-    assert len(set(found)) == len(found) == 4
 
 
 def test_closing_ends_a_running_trial(

@@ -11,13 +11,13 @@ import pytest
 
 from handcal.core.errors import CancelledError, FileError
 from handcal.core.progress import Progress
-from handcal.lab.evaluate.run import UserTestRun
+from handcal.lab.evaluate.user_test import UserTestRun
 from handcal.lab.settings import NoiseStudySettings
 from handcal.lab.study.run import run_study
 from handcal.report.document import Report
 from handcal.report.write import write_report
 from handcal_gui.evaluate.entries import UserEntries
-from handcal_gui.evaluate.work import FileEvaluation
+from handcal_gui.evaluate.work import FileEvaluation, time_left
 
 
 def test_a_study_is_done_and_told(numbers: Any, entries: NoiseStudySettings) -> None:
@@ -112,3 +112,18 @@ def test_given_data_never_goes_into_a_study(numbers: Any, entries: NoiseStudySet
     run_study(numbers.work.study(entries), Path(entries.output), workers=1)
     with pytest.raises(FileError, match="holds a study"):
         data.readiness(replace(given, output=entries.output))
+
+
+@pytest.mark.parametrize(
+    ("elapsed_s", "share", "begun", "words"),
+    [
+        (60.0, 0.5, 0.5, ""),
+        (60.0, 0.75, 0.5, "about 1 min left"),
+        (10.0, 0.5, 0.0, "less than a minute left"),
+        (3600.0, 0.25, 0.0, "about 3 h 0 min left"),
+    ],
+)
+def test_the_time_left_counts_only_what_was_done_since_the_start(
+    elapsed_s: float, share: float, begun: float, words: str
+) -> None:
+    assert time_left(elapsed_s, share, begun) == words

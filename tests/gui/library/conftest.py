@@ -9,13 +9,15 @@ from typing import Any
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QComboBox, QInputDialog, QPushButton, QTableView
+from PySide6.QtWidgets import QComboBox, QInputDialog, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal.core.types import Alignment
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
+from handcal_gui.library.sessions import COLUMNS
 from handcal_gui.library.window import LibraryWindow
+from handcal_gui.widgets.table import Table
 from tests.gui.helpers import child, text
 
 PATIENCE_MS = 10_000
@@ -59,28 +61,27 @@ def window(qtbot: QtBot, folder: Path) -> Iterator[LibraryWindow]:
     window.stop()
 
 
-def table(window: LibraryWindow) -> QTableView:
-    return child(window, QTableView, "sessionTable")
+def table(window: LibraryWindow) -> Table:
+    return child(window, Table, "sessionTable")
 
 
-def rows(window: LibraryWindow) -> list[list[str]]:
+def rows(window: LibraryWindow) -> list[dict[str, str]]:
+    """Return the cells of each row by the first line of the column's title."""
     model = table(window).model()
+    titles = [column.title.split("\n")[0] for column in COLUMNS]
     return [
-        [model.index(row, column).data() for column in range(model.columnCount())]
+        {title: model.index(row, place).data() for place, title in enumerate(titles)}
         for row in range(model.rowCount())
     ]
 
 
 def wearers(window: LibraryWindow) -> list[str]:
-    return [row[0] for row in rows(window)]
+    return [row["Wearer"] for row in rows(window)]
 
 
 def choose(window: LibraryWindow, *wearer: str) -> None:
-    table(window).clearSelection()
-    table(window).setSelectionMode(QTableView.SelectionMode.MultiSelection)
-    for number, row in enumerate(rows(window)):
-        if row[0] in wearer:
-            table(window).selectRow(number)
+    keys = zip(table(window).keys, wearers(window), strict=True)
+    table(window).choose([key for key, name in keys if name in wearer])
 
 
 def press(window: LibraryWindow, name: str) -> None:

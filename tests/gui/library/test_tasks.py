@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from handcal.core.progress import Progress
-from handcal_gui.library.tasks import check_sessions, delete_sessions
+from handcal_gui.library.sessions import check_sessions, delete_sessions
 
 
 def test_messages_name_a_few_of_many_sessions(tmp_path: Path) -> None:

@@ -133,17 +133,6 @@ def test_dialogs_begin_in_the_folder_used_last(
     assert ProjectFolder(project.folder.path).load()[0].chosen_folder == str(mine)
 
 
-def test_what_waits_for_images_is_no_warning_and_names_the_next_step(page: BoardPage) -> None:
-    sign = page.findChild(QLabel, "boardHealth")
-    assert isinstance(sign, QLabel)
-    assert "take images in the next step" in found(page)
-    assert sign.accessibleName() == "Not yet"
-    marker = page.findChild(QDoubleSpinBox, "marker")
-    assert isinstance(marker, QDoubleSpinBox)
-    marker.setValue(25.0)
-    assert sign.accessibleName() == "Problem"
-
-
 def test_the_example_is_offered_unless_it_is_in_use(page: BoardPage, project: RigProject) -> None:
     afresh = page.findChild(QPushButton, "afresh")
     state = page.findChild(QLabel, "initialRigState")

@@ -25,12 +25,11 @@ from handcal.rig.boards.views import WorstView
 from handcal.rig.lens.uncertainty import ProjectionUncertainty
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.sim.photographs import BOARD
-from handcal_gui.rig.coverage_map import CoverageMap
 from handcal_gui.rig.images_panel import ImagesPanel
+from handcal_gui.rig.maps import CoverageMap, UncertaintyMap
 from handcal_gui.rig.project import RigProject
 from handcal_gui.rig.project_folder import ProjectFolder
 from handcal_gui.rig.solve import SolvedPart
-from handcal_gui.rig.uncertainty_map import UncertaintyMap
 from handcal_gui.widgets.drawing import Drawing
 from handcal_gui.widgets.image_view import ImageView
 from tests.gui.helpers import child
@@ -152,6 +151,7 @@ def test_another_board_in_the_images_is_named_once_and_taken_by_a_button(
     offer = child(panel.search, QPushButton, "imagesFix")
     qtbot.waitUntil(lambda: not panel.bar.is_busy, timeout=20_000)
     assert panel.used == 0
+    assert {item(panel, row).text(4) for row in range(8)} == {"Another board"}, "said once, below"
     assert ("10 × 7" in text(panel.search, "imagesFound")) == (entered.squares == (10, 7))
     offer.click()
     qtbot.waitUntil(lambda: not panel.bar.is_busy, timeout=20_000)

@@ -26,13 +26,6 @@ def test_what_was_entered_is_there_again(tmp_path: Path) -> None:
     assert ProjectFolder(tmp_path / "rig").load() == (work, "")
 
 
-def test_a_fresh_folder_begins_with_the_example(tmp_path: Path) -> None:
-    folder = ProjectFolder(tmp_path / "a" / "rig")
-    assert folder.load() == (RigInputs(), "")
-    rig, complaint = folder.load_rig()
-    assert (rig.name, complaint) == (example_rig().name, "")
-
-
 def test_the_rig_is_there_again(tmp_path: Path) -> None:
     folder = ProjectFolder(tmp_path)
     folder.save_rig(replace(example_rig(), name="ours"))

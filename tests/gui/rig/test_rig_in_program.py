@@ -13,12 +13,11 @@ from PySide6.QtWidgets import QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.example import example_rig
-from handcal.rig.rig_file import write_rig
 from handcal_gui.app.manual import Manual
 from handcal_gui.app.preferences import PreferencesFile
 from handcal_gui.app.program import Program
 from handcal_gui.rig.wizard import RigWizard
-from tests.gui.rig.wizard_steps import LEFT
+from tests.gui.rig.wizard_steps import LEFT, RESULT, child
 
 
 @pytest.fixture
@@ -40,8 +39,9 @@ def test_the_start_page_leads_to_a_rig_that_it_uses(program: Program, tmp_path: 
     assert wizard.isVisible()
     assert (tmp_path / "config" / "rig").is_dir()
     path = tmp_path / "ours.yaml"
-    write_rig(path, example_rig())
-    wizard.rig_saved.emit(path)
+    wizard.project.save_rig_as(path)
+    wizard.show_step(RESULT)
+    child(wizard, QPushButton, "useRig").click()
     assert program.start.new.settings.rig == str(path)
     assert program.preferences.station.rig == str(path)
     program.window.close()
@@ -58,8 +58,10 @@ def test_the_rig_is_named_as_soon_as_the_wizard_is_closed(
     wizard = program.windows.calibrate_rig()
     assert wizard is not None
     path = tmp_path / "ours.yaml"
-    write_rig(path, replace(example_rig(), name="Rig 7"))
-    wizard.rig_saved.emit(path)
+    wizard.project.use_rig(replace(example_rig(), name="Rig 7"))
+    wizard.project.save_rig_as(path)
+    wizard.show_step(RESULT)
+    child(wizard, QPushButton, "useRig").click()
     settle, again = (program.start.new.findChildren(QTimer)[place] for place in (0, 1))
     qtbot.waitUntil(lambda: not settle.isActive())
     again.stop()

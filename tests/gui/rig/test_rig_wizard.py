@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PySide6.QtCore import QRect, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
@@ -68,9 +68,7 @@ def test_a_rig_is_calibrated_saved_and_used(
     assert not use.isEnabled()
     choose(tmp_path / "ours.yaml")
     child(wizard, QPushButton, "saveRig").click()
-    with qtbot.waitSignal(wizard.rig_saved) as saved:
-        use.click()
-    assert saved.args == [tmp_path / "ours.yaml"]
+    assert use.isEnabled()
     rig, truth = read_rig(tmp_path / "ours.yaml"), example_rig()
     assert rig.name == "Our headset"
     assert set(rig.origins) == {"T_H_D", "left"}
@@ -242,16 +240,6 @@ def test_a_file_is_checked_when_it_is_chosen(
         page.form.enter(depth_intrinsics="")
         wait(qtbot, wizard)
         assert page.main.isEnabled()
-
-
-def test_a_low_screen_shows_the_buttons_below(wizard: RigWizard) -> None:
-    wizard.show_step(STEREO)
-    wizard.resize(900, 450)
-    assert wizard.height() == 450
-    for name in ("rigNext", "solve"):
-        one = child(wizard, QPushButton, name)
-        place = one.mapTo(wizard, one.rect().topLeft())
-        assert wizard.rect().contains(QRect(place, one.size()))
 
 
 def test_back_and_next_lead_through_the_steps(wizard: RigWizard) -> None:

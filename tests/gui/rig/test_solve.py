@@ -56,6 +56,8 @@ def test_the_depth_camera_is_where_it_was(photographs: Any) -> None:
     shots = shots_of(photographs, "depth", "headset")
     solved = solve_stereo(shots, replace(photographs.work.stereo, dropped=("depth-003.png",)))
     assert solved.verdict.name != "bad"
+    rows = {row.label: row.cells for row in solved.rows}
+    assert rows["If a square is"] == ("25.00 mm", "exactly"), "the ± of the position holds so"
     assert solved.add_to is not None
     rig = solved.add_to(RIG)
     assert np.linalg.norm(rig.T_H_D[:3, 3] - RIG.T_H_D[:3, 3]) < 0.0005

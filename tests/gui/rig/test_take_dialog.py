@@ -26,7 +26,7 @@ from handcal.camera.settings import RealSenseSettings
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.core.errors import CameraError
 from handcal.rig.boards.choose import ALIKE, ChooseSettings
-from handcal_gui.rig.coverage_map import CoverageMap
+from handcal_gui.rig.maps import CoverageMap
 from handcal_gui.rig.shots import read_color
 from handcal_gui.rig.step_page import StepPage
 from handcal_gui.rig.take_dialog import TakeDialog

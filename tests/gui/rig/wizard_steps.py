@@ -46,7 +46,7 @@ def findings(page: QWidget) -> dict[str, tuple[str, str]]:
     assert isinstance(table, QTableWidget)
     role = Qt.ItemDataRole.AccessibleDescriptionRole
     rows = [(table.item(row, 0), table.item(row, 1)) for row in range(table.rowCount())]
-    return {item.text(): (found.text(), item.data(role)) for item, found in rows}
+    return {item.text(): (found.text(), item.data(role)) for item, found in rows if item and found}
 
 
 def marks(wizard: RigWizard) -> list[str]:

@@ -6,7 +6,7 @@ from PySide6.QtGui import QColor, QImage, QPainter
 from pytestqt.qtbot import QtBot
 
 from handcal.core.types import UInt8, UInt16
-from handcal_gui.widgets.image_view import ImageView, shrink
+from handcal_gui.widgets.image_view import ImageView
 
 RED = QColor(255, 0, 0)
 
@@ -84,25 +84,3 @@ def test_another_kind_of_image_is_coloured_at_the_size_shown(qtbot: QtBot) -> No
     assert sizes == [(180, 320)]
     shown(view, 320, 180)
     assert len(sizes) == 1, "a second look at one image costs nothing"
-
-
-def test_a_message_dims_the_image(qtbot: QtBot) -> None:
-    view = ImageView("Test picture")
-    qtbot.addWidget(view)
-    view.show_image(red(320, 180))
-    view.show_text(message="The camera was unplugged")
-    assert view.message == view.accessibleDescription() == "The camera was unplugged"
-    assert shown(view, 320, 180).pixelColor(2, 2) != RED
-    view.show_text(caption="Frozen")
-    assert (view.message, view.caption) == ("", "Frozen")
-    picture = shown(view, 320, 180)
-    assert picture.pixelColor(2, 2) == RED
-    assert picture.pixelColor(160, 172) != RED
-
-
-def test_shrinking_keeps_the_mean_of_fine_texture() -> None:
-    stripes = np.zeros((720, 1280, 3), np.uint8)
-    stripes[:, ::2] = 200
-    small = shrink(stripes, (380, 214))
-    assert small.shape == (214, 380, 3)
-    assert np.abs(small.astype(int) - 100).max() <= 1

@@ -14,6 +14,7 @@ from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import RealSenseSettings
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.core.errors import CameraError, CameraTimeoutError
+from handcal.core.types import CameraIdentity
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.widgets.path_field import PathField
@@ -42,7 +43,8 @@ class Pair:
         source = self.widget.findChildren(QComboBox, "source")[place]
         source.setCurrentIndex(source.findText(text))
 
-    def _open(self, source: str, *how: object) -> ViewpointCamera:
+    def _open(self, source: str, *how: Any) -> ViewpointCamera:
+        how[2](None, CameraIdentity("Intel RealSense D415", f"serial {source}"))
         assert how[:2] == (REALSENSE_SETTINGS, PlaybackSettings(real_time=True, loop=True))
         camera: ViewpointCamera = self.cameras[source]
         return camera
@@ -70,6 +72,8 @@ def test_cameras_of_the_last_time_are_chosen_once_they_are_found(qtbot: QtBot) -
 def test_what_both_see_is_shown_until_it_is_stopped(qtbot: QtBot, pair: Pair) -> None:
     pair.widget.start()
     qtbot.waitUntil(lambda: pair.levels == [50, 90])
+    captions = [view.caption for view in pair.widget.findChildren(ImageView)]
+    assert captions == [f"Intel RealSense D415, serial {n}" for n in (0, 1)], "which of several"
     pair.widget.stop()
     assert pair.levels == []
     assert [view.message for view in pair.widget.findChildren(ImageView)] == 2 * ["No image"]

@@ -1,21 +1,8 @@
 import pytest
-from PySide6.QtCore import QEvent, QObject
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
-
-
-class _Requests(QObject):
-    """Counts the requests to recompute a widget's layout."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.count = 0
-
-    def eventFilter(self, _: QObject, event: QEvent) -> bool:
-        self.count += event.type() == QEvent.Type.LayoutRequest
-        return False
 
 
 @pytest.fixture

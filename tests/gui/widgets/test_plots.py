@@ -1,12 +1,8 @@
 from __future__ import annotations
 
-import gc
-
 import numpy as np
 import pytest
-from PySide6.QtCore import QCoreApplication, QEvent
 from PySide6.QtGui import QColor, QPalette
-from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.app import theme
@@ -34,21 +30,6 @@ def test_a_line_has_the_colour_of_its_role_in_light_and_dark(
     assert plot.item.getAxis("left").textPen().color() != text
     corner = plot.grab().toImage().pixelColor(0, 0)
     assert corner.name() == theme.colors().canvas
-
-
-def test_the_legend_is_readable_after_a_change_to_dark(plot: Plot) -> None:
-    plot.show_legend()
-    plot.add_line("left", name="Left eye")
-    plot.setPalette(QPalette(QColor("#202020")))
-    [(_, label)] = plot.item.legend.items
-    assert plot.palette().windowText().color().name() in label.item.toHtml()
-
-
-def test_lines_of_one_name_are_in_the_legend_once(plot: Plot) -> None:
-    plot.show_legend()
-    for name in ("Left eye", "Right eye", "Left eye"):
-        plot.add_line("left", name=name)
-    assert len(plot.item.legend.items) == 2
 
 
 def test_clear_takes_away_lines_texts_and_legend(plot: Plot) -> None:
@@ -85,20 +66,6 @@ def test_a_gap_is_not_bridged(plot: Plot) -> None:
 def test_neither_wheel_nor_menu_changes_a_plot(plot: Plot) -> None:
     assert plot.item.vb.state["mouseEnabled"] == [False, False]
     assert not plot.item.vb.menuEnabled()
-
-
-@pytest.mark.usefixtures("qapp")
-def test_no_menu_of_pyqtgraph_outlives_a_plot() -> None:
-    before = set(QApplication.topLevelWidgets())
-    plot = Plot("errors", "Errors", "x", "y")
-    gc.disable()  # Python would free the menu some time
-    try:
-        plot.deleteLater()
-        for _ in range(2):  # the plot, then what ends with it
-            QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
-        assert set(QApplication.topLevelWidgets()) <= before
-    finally:
-        gc.enable()
 
 
 def test_negative_numbers_on_an_axis_have_a_minus(plot: Plot) -> None:

@@ -4,7 +4,8 @@ from typing import Any
 import pytest
 
 from handcal.core.progress import Progress
-from handcal.lab.bench import QUICK, bench_table, run_bench
+from handcal.lab.bench.run import bench_table, run_bench
+from handcal.lab.bench.trials import QUICK
 
 
 @pytest.fixture(scope="module")
@@ -23,11 +24,6 @@ def _value(results: dict[str, Any], what: str) -> float:
     return value
 
 
-def test_the_results_are_json(results: dict[str, Any]) -> None:
-    text = json.dumps(results, allow_nan=False)
-    assert json.loads(text)["settings"]["points"] == QUICK.points
-
-
 def test_every_part_tells_its_progress_to_the_end(
     results: dict[str, Any], told: list[tuple[str, float]]
 ) -> None:
@@ -40,6 +36,7 @@ def test_every_part_tells_its_progress_to_the_end(
 
 def test_the_table_has_a_row_for_every_figure(results: dict[str, Any]) -> None:
     rows = bench_table(results)
+    json.dumps(results, allow_nan=False)
     assert len({what for what, *_ in rows}) == len(results["figures"]) == len(rows)
     assert all((target == "") == (met == "") for _, _, target, met in rows)
 
@@ -48,10 +45,6 @@ def test_the_paper_misses_the_hands_depth_over_the_displays(results: dict[str, A
     # A hand 0.5 to 0.6 m away, a display at 2 m.
     assert 25.0 < _value(results, "paper misses") < 31.0
     assert _value(results, "bias at φ3") < 1.0
-
-
-def test_the_paper_is_the_slowest(results: dict[str, Any]) -> None:
-    assert _value(results, "paper / consistent") > 5.0
 
 
 def test_a_straight_hand_is_solved_by_every_method_that_knows_how_the_data_are_made(

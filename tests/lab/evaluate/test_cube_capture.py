@@ -1,3 +1,7 @@
+"""The captures of a cube test: planned, taken, and found."""
+
+from __future__ import annotations
+
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
@@ -6,16 +10,11 @@ import numpy as np
 import pytest
 
 from handcal.camera.viewpoint import ViewpointCamera
-from handcal.core.errors import CameraEndError, CancelledError
+from handcal.core.errors import CameraEndError
 from handcal.core.geometry import rigid
 from handcal.core.types import Intrinsics, UInt8
 from handcal.io.images import write_png
-from handcal.lab.evaluate.cube_capture import (
-    RestWatch,
-    keep_capture,
-    take_at_rest,
-    take_captures,
-)
+from handcal.lab.evaluate.cube_capture import RestWatch, keep_capture, take_at_rest, take_captures
 from handcal.lab.evaluate.cube_folder import (
     CapturePlan,
     PlannedCapture,
@@ -85,20 +84,6 @@ def test_it_takes_what_is_missing_and_asks_again_where_nothing_is_seen(tmp_path:
     assert missing_captures(tmp_path, PLAN) == []
 
 
-def test_it_goes_on_where_it_was_given_up(tmp_path: Path) -> None:
-    stage = Stage([draw_grid(GRID), cube_seen()])
-
-    def ask(what: str) -> None:
-        if len(stage.asked) == 2:
-            raise CancelledError("enough")
-        stage.ask(what)
-
-    with pytest.raises(CancelledError):
-        take_captures(stage, tmp_path, PLAN, CUBE, GRID, ask, lambda _what: None)
-    (missing,) = missing_captures(tmp_path, PLAN)
-    assert missing.file == "centre/pose-1/virtual-a.png"
-
-
 def test_an_image_replaces_an_earlier_one_only_if_the_cube_is_seen(tmp_path: Path) -> None:
     capture = PlannedCapture("a/1", "real")
     seen = np.repeat(cube_seen()[..., None], 3, axis=2)
@@ -163,14 +148,6 @@ def test_a_hand_before_the_real_cube_does_not_make_it_a_drawn_one() -> None:
     assert watched.say(cube_drawn(), DRAWN, 3) == ""
 
 
-def test_what_a_person_took_is_not_taken_again_as_the_next() -> None:
-    watch = RestWatch(CUBE, GRID)
-    watch.took(look(cube_seen(), 1), REAL)
-    said = [watch.consider(look(cube_seen(), n), DRAWN, n * 10**9) for n in range(2, 6)]
-    assert "taken last" in said[-1]
-    assert "" not in said
-
-
 class Film(ViewpointCamera):
     """A camera that sees scenes one after the other, each for a second, at 5 frames a second."""
 
@@ -206,6 +183,45 @@ def test_captures_are_taken_by_themselves(tmp_path: Path) -> None:
     assert said[2].startswith("centre/grid.png: ")
 
 
-def test_a_camera_that_ends_ends_the_captures(tmp_path: Path) -> None:
-    with pytest.raises(CameraEndError):
-        take_at_rest(Film([cube_seen()]), tmp_path, PLAN, CUBE, GRID, lambda _: None)
+def touch(folder: Path, *files: str) -> None:
+    for file in files:
+        (folder / file).parent.mkdir(parents=True, exist_ok=True)
+        (folder / file).touch()
+
+
+def test_a_plan_is_gone_through_position_by_position() -> None:
+    plan = CapturePlan(positions=("left", "right"), poses=1, drawn=("a", "b"))
+    assert [capture.file for capture in plan.captures] == [
+        f"{position}/{file}.png"
+        for position in ("left", "right")
+        for file in ("grid", "pose-1/real", "pose-1/virtual-a", "pose-1/virtual-b")
+    ]
+
+
+def test_what_is_there_in_any_format_is_not_missing(tmp_path: Path) -> None:
+    plan = CapturePlan(positions=("left",), poses=1)
+    assert missing_captures(tmp_path / "none", plan) == list(plan.captures)
+    touch(tmp_path, "left/grid.JPG", "left/pose-1/real.png", "left/pose-1/virtual.txt")
+    (missing,) = missing_captures(tmp_path, plan)
+    assert missing.file == "left/pose-1/virtual.png"
+    touch(tmp_path, missing.file)
+    assert missing_captures(tmp_path, plan) == []
+    (found,), incomplete = find_captures(tmp_path)
+    assert (found.position, found.pose, found.real.name) == ("left", "pose-1", "real.png")
+    assert not incomplete
+
+
+@pytest.mark.parametrize(
+    ("positions", "drawn", "message"),
+    [
+        (("../other",), (), "letters, digits, _ and -, not '../other'"),
+        (("a",), ("b c",), "not 'b c'"),
+        (("a", "b", "a"), (), "a is named twice"),
+        ((), (), "at least one"),
+    ],
+)
+def test_names_that_make_no_plan_are_refused(
+    positions: tuple[str, ...], drawn: tuple[str, ...], message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        CapturePlan(positions=positions, drawn=drawn)

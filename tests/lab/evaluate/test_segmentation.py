@@ -11,12 +11,10 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from matplotlib.figure import Figure as Canvas
 
 from handcal.camera.images import write_frame
 from handcal.cli.main import main
-from handcal.core.errors import CancelledError, FileError, HandError
-from handcal.core.progress import Progress
+from handcal.core.errors import FileError, HandError
 from handcal.core.types import Frame, HandCloud
 from handcal.hand.segment import segment_hand
 from handcal.hand.settings import SegmentSettings
@@ -29,9 +27,7 @@ from handcal.lab.evaluate.masked_frames import (
     scaled,
     subsampled,
 )
-from handcal.lab.evaluate.run import run_segmentation_test
 from handcal.lab.evaluate.segmentation import evaluate_frame, evaluation
-from handcal.lab.settings import SegmentationTestSettings
 from handcal.sim.camera import simulated_frame
 
 GATE = SegmentSettings()
@@ -82,14 +78,6 @@ def test_half_a_mask_is_half_as_good(shot: MaskedFrame) -> None:
     row, _ = evaluate_frame(shot, lambda frame: first.pop()(frame) if first else by_depth(frame))
     assert row.iou == row.kept == pytest.approx(halved)
     assert row.area_change == pytest.approx(1 / halved - 1, rel=0.1)
-
-
-def test_what_lies_beyond_the_gate_counts_as_lost(shot: MaskedFrame) -> None:
-    whole = shot.is_hand & (shot.frame.depth > 0)
-    near = shot.frame.depth <= np.median(shot.frame.depth[whole])
-    lost = changed(by_depth, lambda cloud: replace(cloud, mask=np.where(near, cloud.mask, 0)))
-    row, _ = evaluate_frame(shot, lambda frame: (lost if frame is shot.frame else by_depth)(frame))
-    assert row.kept == pytest.approx((whole & near).sum() / whole.sum())
 
 
 def test_what_is_refused_is_counted_with_its_reason(shot: MaskedFrame) -> None:
@@ -182,20 +170,6 @@ def test_a_folder_is_judged_by_the_command(
     assert "9: no hand-sized object" in capsys.readouterr().out
 
 
-def test_points_at_the_frame_are_drawn_in_full(folder: Path) -> None:
-    report = run_segmentation_test(SegmentationTestSettings(str(folder), "depth")).report
-    axes = Canvas().subplots(1, 2)
-    report.figures[0].draw(axes)
-    assert not any(line.get_clip_on() for ax in axes for line in ax.lines)
-
-
-def test_the_test_can_be_cancelled(folder: Path) -> None:
-    with pytest.raises(CancelledError):
-        run_segmentation_test(
-            SegmentationTestSettings(str(folder), "depth"), Progress(is_cancelled=lambda: True)
-        )
-
-
 @pytest.mark.parametrize(
     ("edit", "reason"),
     [
@@ -229,13 +203,6 @@ def test_a_folder_of_no_frames_is_known_before_they_are_read(folder: Path) -> No
     (folder / "meta.json").unlink()
     with pytest.raises(FileError, match=r"holds no meta\.json"):
         read_masked_names(folder)
-
-
-@pytest.mark.parametrize("content", ["{}", '{"../a": {}}', '{"a": 3}', "[]", "no"])
-def test_a_wrong_list_of_frames_is_refused(tmp_path: Path, content: str) -> None:
-    (tmp_path / "meta.json").write_text(content)
-    with pytest.raises(FileError):
-        read_masked_names(tmp_path)
 
 
 def test_an_empty_mask_is_refused(folder: Path) -> None:

@@ -76,12 +76,6 @@ def test_tables_give_means_with_their_intervals(report: Report) -> None:
     assert by_angle["0"][1] == "0.0 (0.0–0.0)"
 
 
-def test_a_section_without_rows_is_left_out(report: Report) -> None:
-    titles = {section.title for section in report.sections}
-    assert {"Rotation", "Hand shape"} <= titles
-    assert not {"Forearm", "Wearer"} & titles
-
-
 def test_figures_hold_the_numbers_that_they_show(report: Report) -> None:
     figures = {figure.name: figure for figure in report.figures}
     assert set(figures) == {"rotation", "rotation-components", "hand-shape"}
@@ -112,16 +106,6 @@ def test_figures_are_drawn_with_the_line(report: Report) -> None:
     assert "consistent" in right
 
 
-def test_methods_differ_by_more_than_their_colours(report: Report) -> None:
-    left, _ = _drawn(report, "rotation")
-    looks = [
-        (line.get_marker(), line.get_linestyle())
-        for line in left.get_lines()
-        if not str(line.get_label()).startswith("_")
-    ]
-    assert len(set(looks)) == len(looks) == len(SLOPES_MM)
-
-
 def _drawn(report: Report, name: str) -> list[Axes]:
     (figure,) = [figure for figure in report.figures if figure.name == name]
     axes = [Canvas().add_subplot() for _ in range(figure.columns)]
@@ -134,12 +118,3 @@ def test_a_single_alignment_has_no_interval() -> None:
     report = noise_report(SETTINGS, rows)
     assert table(report, "Rotation") == [["5", "1.0", "1.0", "1.0", "1.0"]]
     assert report.figures[0].rows[0]["length_low_mm"] is None
-
-
-def test_points_at_the_frame_are_drawn_in_full(report: Report) -> None:
-    [figure] = [one for one in report.figures if one.name == "rotation"]
-    axes = Canvas().subplots(1, 2)
-    figure.draw(axes)
-    lines = [line for ax in axes for line in ax.lines if line.get_marker() != "None"]
-    assert lines
-    assert not any(line.get_clip_on() for line in lines)

@@ -155,14 +155,6 @@ def test_edges_that_a_depth_check_found_cost_little_and_unknown_ones_are_not_bel
         assert wrong["verdict"] != "accept"
 
 
-def test_half_as_fat_edges_are_half_as_bad() -> None:
-    one, two = (
-        [errors(row)[1] for row in procedure_trial(SETTINGS, case("paper", variant=variant))]
-        for variant in ("fat-1mm", "fat-2mm")
-    )
-    assert np.mean(one) < np.mean(two)
-
-
 @pytest.mark.parametrize(
     ("variant", "at_most"), [("constant-size", 8.0), ("constant-direction", 2 * CONSTANT_ARCMIN)]
 )
@@ -232,13 +224,6 @@ def test_the_figures_of_known_rows() -> None:
     assert found.expected_actual_correlation == pytest.approx(1.0)
     assert found.expected_over_actual == pytest.approx(0.5)
     assert found.after_p95_arcmin == pytest.approx(np.quantile([2.0, 4.0, 12.0, 6.0], 0.95))
-
-
-def test_what_has_no_verdict_has_no_share() -> None:
-    rows = [made(2.0, verdict=None, expected_arcmin=None, plan="spaam-25")] * 2
-    (found,) = procedure_rows(rows)
-    assert found.accepted_share is None
-    assert found.expected_over_actual is found.depth_after_mm is None
 
 
 @pytest.mark.parametrize(

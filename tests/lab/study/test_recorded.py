@@ -26,15 +26,6 @@ def test_spaam_is_the_authors_own_on_all_recordings(folder: Path) -> None:
         assert result.spaam_px == pytest.approx(result.authors_spaam_px, abs=1e-4)
 
 
-def test_indica_draws_near_with_an_eye_it_never_saw_aligned(folder: Path) -> None:
-    """A wrong frame, sign or distance would miss by a hundred pixels and more."""
-    results = evaluate_recordings(read_recordings(folder))
-    for setup in ("recycled_px", "full_px"):
-        errors_px = [getattr(result, setup) for name, result in results.items() if name != "Base"]
-        assert 4.0 < np.median(errors_px) < 9.0
-        assert max(errors_px) < 10.0
-
-
 def test_the_study_takes_its_wearers_errors_from_here(folder: Path) -> None:
     results = list(evaluate_recordings(read_recordings(folder)).values())
     freedom = [2 * result.alignments - 11 for result in results]
@@ -85,11 +76,6 @@ def test_a_recording_that_tells_no_projection_is_named(folder: Path) -> None:
     short = replace(data.recordings["7"], points_m=np.ones((3, 3)), pixels=np.ones((3, 2)))
     with pytest.raises(FileError, match="recording 7: points_m has 3 points"):
         evaluate_recordings(replace(data, recordings={**data.recordings, "7": short}))
-
-
-def test_another_folder_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match="the data set is incomplete"):
-        read_recordings(tmp_path)
 
 
 def test_the_command_tells_every_recording(

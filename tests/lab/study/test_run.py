@@ -1,3 +1,7 @@
+"""Runs of a study: in any number of processes, resumed, and refused."""
+
+from __future__ import annotations
+
 import multiprocessing
 import os
 import signal
@@ -5,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,7 +18,7 @@ import pytest
 
 from handcal.core.errors import CancelledError, FileError, HandcalError
 from handcal.core.progress import Progress
-from handcal.lab.study.run import Case, Study, run_study, share_done
+from handcal.lab.study.run import OVERSUBSCRIBE, Case, Study, open_workers, run_study, share_done
 from handcal.lab.study.store import StudyRow
 from tests.helpers import ROOT
 
@@ -224,15 +229,6 @@ def test_a_worker_that_dies_is_reported_and_the_study_continues(tmp_path: Path) 
     assert rows == run_study(make_study(), tmp_path / "other", workers=1)
 
 
-def test_how_much_is_done_is_reported_without_reading_it(tmp_path: Path) -> None:
-    study = make_study()
-    run_study(study, tmp_path, workers=1)
-    chunks = sorted((tmp_path / "chunks").iterdir())
-    chunks[0].unlink()
-    chunks[1].write_bytes(b"damaged")
-    assert share_done(study, tmp_path) == 1.0 - 1.0 / len(chunks)
-
-
 @pytest.mark.parametrize("damage", [b"", b"{", b'{"rows": [[]], "sha256": ""}', b"\xff", None])
 def test_a_damaged_chunk_is_done_again(tmp_path: Path, damage: bytes | None) -> None:
     rows = run_study(make_study(), tmp_path, workers=1)
@@ -260,39 +256,18 @@ def test_a_folder_of_another_study_is_refused(tmp_path: Path, other: Study, mess
     assert (tmp_path / "rows.csv").read_bytes() == table
 
 
-def test_a_study_file_that_is_none_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "study.json").write_text("[]")
-    with pytest.raises(FileError, match="JSON object"):
-        run_study(make_study(), tmp_path, workers=1)
-
-
 def test_a_trial_that_fails_says_in_which_case(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="no such thing") as raised:
         run_study(replace(make_study(), trial=fail_at_three), tmp_path, workers=1)
     assert "in the study's case {'number': 3}" in raised.value.__notes__
 
 
-def test_a_number_that_is_none_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="JSON compliant"):
-        run_study(replace(make_study(), trial=nan), tmp_path, workers=1)
-
-
-def test_a_study_without_cases_has_no_rows(tmp_path: Path) -> None:
-    assert run_study(make_study(cases=0), tmp_path, workers=1) == []
-
-
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nowhere", "tcp://nowhere.invalid:1"])
 def test_no_cluster_there(tmp_path: Path, address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr("handcal.lab.study.workers._CONNECT_S", 0.2)
+    monkeypatch.setattr("handcal.lab.study.run._CONNECT_S", 0.2)
     with pytest.raises(HandcalError, match="no Dask scheduler answers"):
         run_study(make_study(), tmp_path, scheduler=address)
-
-
-def test_dask_is_not_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(HandcalError, match=r"handcal\[cluster\]"):
-        run_study(make_study(), tmp_path, scheduler="tcp://127.0.0.1:9")
 
 
 @pytest.mark.process
@@ -321,3 +296,39 @@ def test_a_link_in_a_studys_folder_is_not_followed(tmp_path: Path) -> None:
     with pytest.raises(FileError, match="is a link"):
         run_study(make_study(), folder, workers=1)
     assert (mine / "0000.json").read_text() == "mine"
+
+
+def opened_workers(workers: int | None, monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Return how many processes were asked for, without starting them."""
+    asked: list[int] = []
+
+    class Pool(ThreadPoolExecutor):
+        def __init__(self, workers: int, *_: object) -> None:
+            asked.append(workers)
+            super().__init__(1)
+
+    monkeypatch.setattr("handcal.lab.study.run.ProcessPoolExecutor", Pool)
+    with open_workers(workers, None) as executor:
+        assert executor.submit(abs, -3).result() == 3
+    return asked
+
+
+@pytest.mark.parametrize("workers", [None, 2, 4])
+def test_there_are_no_more_workers_than_cores(
+    workers: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("os.cpu_count", lambda: 4)
+    assert opened_workers(workers, monkeypatch) == [workers or 4]
+    with pytest.raises(HandcalError, match="5 processes on the 4 cores"):
+        opened_workers(5, monkeypatch)
+    monkeypatch.setenv(OVERSUBSCRIBE, "1")
+    assert opened_workers(5, monkeypatch) == [5]
+
+
+@pytest.mark.parametrize(("platform", "opened"), [("win32", 61), ("linux", 100)])
+def test_windows_waits_for_61_processes_at_most(
+    platform: str, opened: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("os.cpu_count", lambda: 100)
+    monkeypatch.setattr(sys, "platform", platform)
+    assert opened_workers(100, monkeypatch) == [opened]

@@ -1,1 +1,0 @@
-"""Automatic operation of the program, for demonstrations and screenshots."""
