@@ -356,9 +356,8 @@ def test_a_headset_that_was_off_is_verified_first_and_nothing_is_fused(
     for eye, shift_m in before.procedure.applied_shift_m.items():
         np.testing.assert_allclose(live.snapshot.procedure.applied_shift_m[eye], shift_m)
     live.press_space_for(Action.NEXT)
-    live.wait(
-        lambda: (shown := live.program.wizard_panel.shown) is not None and shown.step is Step.VERIFY
-    )
+    panel = live.program.wizard_panel
+    live.wait(lambda: panel.shown is not None and panel.shown.step is Step.VERIFY)
     assert Session.open(before.session_path).is_finished
 
 

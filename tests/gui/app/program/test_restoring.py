@@ -17,6 +17,21 @@ from handcal_gui.app.program import Program
 from tests.gui.helpers import child
 
 
+def test_a_maximized_window_and_its_layout_are_restored(qtbot: QtBot, tmp_path: Path) -> None:
+    file = PreferencesFile(tmp_path / "preferences.json")
+    program = Program(file)
+    qtbot.addWidget(program.window)
+    program.window.showMaximized()
+    layout = program.window.layout_text().replace('"chosen": {}', '"chosen": {"cloud": true}')
+    program.window.restore_layout(layout)
+    program.close()
+    program = Program(file)
+    qtbot.addWidget(program.window)
+    assert program.window.isMaximized()
+    assert program.window.layout_text() == layout
+    program.close()
+
+
 def test_hidden_layers_of_the_hand_cloud_are_remembered(qtbot: QtBot, tmp_path: Path) -> None:
     file = PreferencesFile(tmp_path / "preferences.json")
     for hidden in (HIDDEN_LAYERS, ("cursor",)):

@@ -17,7 +17,7 @@ from handcal.calibration.states import State
 from handcal.core.types import EYES, Eye, Rig
 from handcal.register.results import Results
 from handcal.session.session import Session, SessionRecord
-from handcal.session.trial import Comparison, Drawing, make_trial
+from handcal.session.trial import Comparison, make_trial
 from handcal.station.snapshot import Snapshot
 from handcal_gui.calibrate.fine_tune.panel import FineTunePanel
 from handcal_gui.calibrate.trials.comparison_row import ComparisonRow
@@ -232,9 +232,9 @@ def test_a_comparison_is_begun_answered_once_both_were_shown_and_counted(
     child(row, QPushButton, "compareEnd").click()
     engine.station.trials.end_comparison.assert_called_once()
     with Session(record.path) as session:
-        firsts: tuple[Drawing, ...] = ("offline", "applied", "offline")
-        for first in firsts:
-            session.save_comparison(Comparison(first, "second", {"left": np.zeros(3)}))
+        for _ in range(2):
+            session.save_comparison(Comparison("offline", "second", {"left": np.zeros(3)}))
+        session.save_comparison(Comparison("applied", "second", {"left": np.zeros(3)}))
         session.save_comparison(Comparison("offline", "neither", {"left": np.zeros(3)}))
     panel.show_record(Session.open(record.path))
     assert text(panel, "summary").splitlines()[-1] == (
