@@ -44,7 +44,7 @@ from handcal_gui.widgets.placement import keep_on_screen
 
 Page = Literal["start", "live", "review"]
 Arrangement = Literal["panels", "station"]
-_SHARES = 0.25, 0.28
+_SHARES = (0.22, 0.315)
 """Of the window's width, for the columns of panels; what the user drags replaces them."""
 _REVIEW = frozenset({"cloud", "results", "trials", "session"})
 """Panels of a stored session."""
