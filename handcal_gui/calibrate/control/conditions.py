@@ -144,7 +144,7 @@ class Conditions:
         if self._is_camera:
             advice = tr("plug the camera into a USB 3 port")
         text = tr(
-            "images per second: {:.0f} of the {:.0f} needed; {}, or confirmations may be refused"
+            "images per second: {:.0f}, fewer than {:.0f}; {}, or confirmations may be refused"
         )
         return text.format(rate_hz, _SLOW_HZ, advice)
 

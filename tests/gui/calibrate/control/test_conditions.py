@@ -74,10 +74,10 @@ def test_a_slow_computer_is_named_once_until_it_is_fast_again(snapshot: Maker) -
     assert watch(conditions, slow, [1.0, 3.0]) == ["", ""]
     texts = watch(conditions, slow, [4.0, 5.0, 6.0])
     assert conditions.is_slow
-    assert texts[-1].startswith("images per second: 2 of the 8 needed")
+    assert texts[-1].startswith("images per second: 2, fewer than 8")
     assert texts[-1].endswith("or confirmations may be refused")
     slower = snapshot(camera={"rate_hz": 1.0})
-    assert "images per second: 1 of the 8" in watch(conditions, slower, [7.0])[0]
+    assert "images per second: 1, fewer than 8" in watch(conditions, slower, [7.0])[0]
     watch(conditions, fast, [8.0, 11.0])
     assert not conditions.is_slow
     assert watch(conditions, fast, [12.0]) == [""]
