@@ -1,4 +1,4 @@
-"""Makes the README's moving picture of pictures of the guide's steps, in their order.
+"""Makes the README's moving picture of pictures of the guide's steps, in the order in which they were taken.
 
 python docs/moving_picture.py FOLDER    # of handcal-gui --screenshots FOLDER
 """
@@ -17,7 +17,7 @@ _MOST_BYTES = 2_000_000
 def main() -> None:
     """Write docs/pictures/calibration.gif."""
     frames = []
-    for path in sorted(Path(sys.argv[1]).glob("step-*.png")):
+    for path in sorted(Path(sys.argv[1]).glob("step-*.png"), key=lambda path: path.stat().st_mtime):
         with Image.open(path) as image:
             height = round(image.height * _WIDTH_PX / image.width)
             small = image.convert("RGB").resize((_WIDTH_PX, height), Image.Resampling.LANCZOS)

@@ -98,7 +98,7 @@ def test_advice_names_usb_only_for_a_camera_that_sends_few_frames(
     watch(conditions, snapshot(camera={"rate_hz": 2.0}), [0.0, 1.0])
     later = snapshot(camera={"rate_hz": 2.0, "dropped": dropped})
     assert watch(conditions, later, [4.0, 5.0])[-1].endswith(
-        f"needed; {advice}, or confirmations may be refused"
+        f"fewer than 8; {advice}, or confirmations may be refused"
     )
 
 
