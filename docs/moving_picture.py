@@ -1,4 +1,4 @@
-"""Makes the README's moving picture of pictures of the guide's steps, in the order in which they were taken.
+"""Makes the README's moving picture of the pictures of the guide's steps, in their order.
 
 python docs/moving_picture.py FOLDER    # of handcal-gui --screenshots FOLDER
 """
