@@ -273,7 +273,7 @@ def test_a_fault_is_named_and_never_accepted(fault: str, tmp_path: Path) -> None
     for eye in result["eyes"].values():
         assert (eye["verdict"], eye["evidence"]) == ("contradicted", [fault])
         assert eye["reason"] in run.out.replace("\n", " ")
-    assert "Both eyes, contradicted: " in run.out
+    assert "Both eyes, Contradicted: " in run.out
 
 
 @pytest.mark.slow

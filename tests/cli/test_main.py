@@ -181,10 +181,10 @@ def test_a_session_is_checked_and_repaired(
         session.save_alignment(simulated(2))
     assert check(session.path) == (0, {"state": "sound", "damaged": []})
     (session.path / "alignments/1.npz").write_bytes(b"nothing")
-    what = "its checksum is not the journal's; alignment 1 was left out"
-    damaged = {"file": "alignments/1.npz", "line": None, "what": what}
+    what, instead = "its checksum is not the journal's", "alignment 1 was left out"
+    damaged = {"file": "alignments/1.npz", "line": None, "what": what, "instead": instead}
     assert check(session.path) == (1, {"state": "damaged", "damaged": [damaged]})
-    assert f"alignments/1.npz: {what}" in capsys.readouterr().out
+    assert f"alignments/1.npz: {what}; {instead}" in capsys.readouterr().out
     code, found = check(tmp_path)
     assert (code, found["state"]) == (2, "none")
     assert capsys.readouterr().out.startswith(f"{tmp_path} is not a session")

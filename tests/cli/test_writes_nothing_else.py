@@ -88,7 +88,7 @@ NEED_MORE = {
     "replay", "evaluate cube capture", "evaluate cube report", "evaluate detector",
     "study recorded", "rig take", "rig camera", "rig stereo", "rig convert", "rig display",
     "rig make", "rig depth", "rig accept", "evaluate segmentation", "evaluate cube track",
-    "evaluate trials", "pair", "openxr install",
+    "evaluate trials", "pair", "openxr install", "openxr client",
 }  # fmt: skip
 """Commands whose input would have to be made first; they write as those above.
 

@@ -25,7 +25,7 @@ VECTORS = st.tuples(OFFSET, OFFSET, OFFSET)
 TRANSFORMS = st.builds(rigid, st.tuples(*[st.floats(-3, 3)] * 3), VECTORS)
 VIEWS = st.builds(rigid, st.tuples(*[st.floats(-0.8, 0.8)] * 3), VECTORS)
 SIDE = st.integers(1, 16384)
-FOCAL_SIDES, AXIS_SHARE = st.floats(0.2, 9.0), st.floats(0.2, 0.8)
+FOCAL_SIDES, AXIS_SHARE = st.floats(0.32, 5.0), st.floats(0.2, 0.8)  # 11° to 115° across
 DISPLAYS = st.builds(
     lambda side, f, c, **others: EyeDisplay(
         K=np.array([[f * side, 0, c * side], [0, f * side, c * side], [0, 0, 1]]),
