@@ -390,7 +390,9 @@ class SessionState:
         self.rig, self.settings = rig, settings
         self.notes_sha256 = ("",)
 
-    def _set_results(self, results: dict[str, Any] | None) -> None:
+    def _set_results(self, results: Any) -> None:
+        if not isinstance(results, dict | None):
+            raise ValueError("its results are no object")
         if self.results is not None:
             self.older_results.append(self.results)
         self.results = results
