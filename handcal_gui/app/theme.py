@@ -12,7 +12,6 @@ from PySide6.QtGui import (
     QColor,
     QFont,
     QFontDatabase,
-    QFontInfo,
     QGuiApplication,
     QIcon,
     QImage,
@@ -252,11 +251,6 @@ def number_font(scale: float = 1.0) -> QFont:
     font = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
     font.setPointSizeF(scale * QGuiApplication.font().pointSizeF())
     return font
-
-
-def font_px() -> int:
-    """Return the size of the program's font in pixels: 12 by default on most systems."""
-    return QFontInfo(QGuiApplication.font()).pixelSize()
 
 
 def scale_font(widget: QWidget, scale: float, *, is_bold: bool = False) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from handcal.core.errors import FileError
@@ -216,6 +216,7 @@ FIELDS = [
 
 
 @given(st.sampled_from(list(SessionEvent)), st.dictionaries(st.sampled_from(FIELDS), JSON))
+@example(SessionEvent.COPIED, {"notes_sha256": "", "results": 1, "is_solved": True})
 @settings(deadline=None)
 def test_a_strange_event_is_refused_or_harmless(
     tmp_path_factory: pytest.TempPathFactory,

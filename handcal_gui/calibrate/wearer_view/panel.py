@@ -34,8 +34,6 @@ _LEGEND = {
 
 _SHAPE = 4.0 / 3.0
 """Width of an eye's picture relative to its height, as mostly cropped to a hand."""
-_OPTIONS_EMS = 5.0
-"""Height of options and legend together."""
 _NUMBER_SCALE = 0.85
 """Font scale at which both eyes' numbers fit side by side into a narrow dock."""
 
