@@ -12,7 +12,13 @@ from handcal.core.display import projection_matrix
 from handcal.core.progress import Progress
 from handcal.core.types import Eye, Float64, Projection
 from handcal.register.results import Results, SolveSettings
-from handcal.session.drawn import DrawnShift, ShiftKind, drawn_error_arcmin, drawn_shifts
+from handcal.session.drawn import (
+    DrawnShift,
+    ShiftKind,
+    drawn_error_arcmin,
+    drawn_shifts,
+    is_judged,
+)
 from handcal.session.record import eye_trials
 from handcal.session.session import SessionRecord
 from handcal.session.trial import SAME_SHIFT_M, EyeTrials
@@ -65,6 +71,16 @@ class SessionOutcome:
         """Return whether the headset rendered with this φ of the eye at the end."""
         last_m = self.record.applied_shift_m.get(eye, np.zeros(3))
         return bool(np.abs(last_m - self.shifts_m[eye][kind]).max() < SAME_SHIFT_M)
+
+    def is_verified(self, eye: Eye) -> bool:
+        """Return whether the wearer verified what is final, with the present alignments."""
+        results = self.results
+        return (
+            results is not None
+            and eye in results.verified
+            and eye in self.record.verified_now
+            and is_judged(results.verdicts[eye].name, self.drawn[eye].kind)
+        )
 
     def expected_arcmin(self, eye: Eye, kind: ShiftKind) -> float | None:
         """Return the error expected of drawing with a φ of the eye; None if nothing is solved."""

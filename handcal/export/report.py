@@ -51,12 +51,11 @@ from handcal.report.document import (
     settings_items,
 )
 from handcal.report.statistics import mean_interval
-from handcal.session.drawn import ShiftKind
+from handcal.session.drawn import ShiftKind, is_judged, result_word
 from handcal.session.record import eye_trials
 from handcal.session.trial import (
     Comparison,
     ErrorStatistics,
-    EyeTrials,
     Trial,
     calibration_numbers,
     count_comparisons,
@@ -87,7 +86,7 @@ def _sections(outcome: SessionOutcome) -> Iterator[Section]:
         yield _verifications_section(outcome)
     if results is not None:
         yield _solution(results)
-        yield _distances(results)
+        yield _distances(outcome, results)
     if results is not None and results.alignments:
         yield _alignments(outcome, results)
         yield _shift_plots(outcome, results)
@@ -119,15 +118,18 @@ def _answer(outcome: SessionOutcome) -> str:
     if results is None:
         return "Nothing is solved: the session holds no alignment."
     return " ".join(
-        f"{eye.capitalize()} eye: {verdict_text(verdict, outcome.trials.get(eye))}, "
+        f"{eye.capitalize()} eye: {_verdict_text(outcome, eye, verdict)}, "
         f"{error_text(outcome, eye)}."
         for eye, verdict in results.verdicts.items()
     )
 
 
-def verdict_text(verdict: Verdict, trials: EyeTrials | None) -> str:
-    """Return the word of a verdict, with what the trials of an accepted eye say against it."""
-    word = VERDICT_WORDS[verdict.name]
+def _verdict_text(outcome: SessionOutcome, eye: Eye, verdict: Verdict) -> str:
+    """Return the word for an eye, with what the trials of an accepted one say against it."""
+    kind, trials = outcome.drawn[eye].kind, outcome.trials.get(eye)
+    word = result_word(verdict.name, kind)
+    if not is_judged(verdict.name, kind):
+        return f"{word}, not judged"
     if trials is None or not is_doubted(verdict.name, trials):
         return word
     return (
@@ -144,12 +146,7 @@ def error_text(outcome: SessionOutcome, eye: Eye) -> str:
         return "not solved"
     if drawn.kind == "offline":
         return f"error {arcmin:.1f}′ expected with the offline calibration"
-    is_verified = (
-        outcome.results is not None
-        and eye in outcome.results.verified
-        and eye in outcome.record.verified_now
-    )
-    how = "verified by the wearer" if is_verified and drawn.kind == "solved" else "expected"
+    how = "verified by the wearer" if outcome.is_verified(eye) else "expected"
     return f"error {arcmin:.1f}′ {how}, {before:.1f}′ before"
 
 
@@ -170,7 +167,7 @@ def _eyes(outcome: SessionOutcome, results: Results) -> Section:
         [
             [
                 eye,
-                VERDICT_WORDS[verdict.name],
+                result_word(verdict.name, outcome.drawn[eye].kind),
                 f"{results.benefits[eye].without_arcmin:.1f}",
                 f"{verified.before_arcmin:.1f}" if (verified := results.verified.get(eye)) else "–",
                 f"{outcome.expected_arcmin(eye, outcome.drawn[eye].kind):.1f}",
@@ -185,10 +182,18 @@ def _eyes(outcome: SessionOutcome, results: Results) -> Section:
         ],
     )
     reasons = (
-        f"{eye.capitalize()} eye: {_reason(verdict, results.eyes[eye])}."
+        f"{eye.capitalize()} eye{_unjudged(outcome, eye, verdict)}: "
+        f"{_reason(verdict, results.eyes[eye])}."
         for eye, verdict in results.verdicts.items()
     )
     return Section("", [table, *reasons])
+
+
+def _unjudged(outcome: SessionOutcome, eye: Eye, verdict: Verdict) -> str:
+    """Return that the verdict on an eye is about another φ than the final one, if it is so."""
+    if is_judged(verdict.name, outcome.drawn[eye].kind):
+        return ""
+    return f", the solved φ, which is not final ({VERDICT_WORDS[verdict.name]})"
 
 
 def _verifications(outcome: SessionOutcome, eye: Eye) -> list[Verification]:
@@ -310,7 +315,7 @@ def _solution(results: Results) -> Section:
     return Section("How it was solved", items)
 
 
-def _distances(results: Results) -> Section:
+def _distances(outcome: SessionOutcome, results: Results) -> Section:
     """Return the section with the error expected at other distances than those of the verdict."""
     eyes = list(results.benefits)
     table = Table(
@@ -322,18 +327,23 @@ def _distances(results: Results) -> Section:
             [f"{at[0].distance_m:g}", *(text for one in at for text in one.texts)]
             for at in zip(*(results.benefits[eye].by_distance for eye in eyes), strict=True)
         ],
-        "Expected error, arcmin, without the calibration and with it, and the interval that holds "
-        f"95 %. {BY_DISTANCE}",
+        "Expected error, arcmin, without the calibration and with the solved φ, and the interval "
+        f"that holds 95 %. {BY_DISTANCE}",
     )
     figure = Figure(
         "distances",
-        "Grey: without the calibration; coloured: with it; shaded: 95 %.",
+        "Grey: without the calibration; coloured: with the solved φ; shaded: 95 %.",
         lambda axes: figures.draw_distances(axes, results),
         list(distance_rows(results)),
         height_mm=55.0,
         columns=2,
     )
-    return Section("Error against distance", [table, figure])
+    others = [
+        f"The final φ of the {eye} eye is another ({outcome.drawn[eye].kind})."
+        for eye in eyes
+        if outcome.drawn[eye].kind != "solved"
+    ]
+    return Section("Error against distance", [*others, table, figure])
 
 
 def _reason(verdict: Verdict, shift: EyeShift) -> str:

@@ -14,6 +14,7 @@ from handcal.io.files import write_atomic
 from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import Results
 from handcal.report.cells import rows_csv
+from handcal.session.drawn import ShiftKind, is_judged
 from handcal.session.trial import Comparison, Trial, read_comparisons
 
 _WHOSE = ("session", "wearer", "begun_utc", "simulated")
@@ -42,6 +43,7 @@ _PARAMETERS = (
     "depth_before_mm",
     "depth_after_mm",
     "verifications",
+    "verified",
     "verification_found_arcmin",
     "trials",
     "trials_mean_arcmin",
@@ -144,24 +146,34 @@ def parameter_rows(outcome: SessionOutcome) -> Iterator[dict[str, Any]]:
                 **_triple("phi{}_mm", 1e3 * shift_m),
                 **(_solved(outcome, results.eyes[eye]) if results and kind == "solved" else {}),
                 "expected_error_arcmin": outcome.expected_arcmin(eye, kind),
-                **(_judged(outcome, results, eye) if results and eye in results.eyes else {}),
+                **(_judged(outcome, results, eye, kind) if results and eye in results.eyes else {}),
             }
 
 
-def _judged(outcome: SessionOutcome, results: Results, eye: Eye) -> dict[str, Any]:
-    """Return what is known of an eye, whichever of its φ is final."""
+def _judged(outcome: SessionOutcome, results: Results, eye: Eye, kind: ShiftKind) -> dict[str, Any]:
+    """Return what is known of an eye, in the rows of its solved and its final φ.
+
+    The verdict is only in the row of a φ that it is about.
+    """
+    is_final = kind == outcome.drawn[eye].kind
+    if not (is_final or kind == "solved"):
+        return {}
     verdict, benefit = results.verdicts[eye], results.benefits[eye]
     verification = outcome.record.facts.verified.get(eye)
     verified, trials = results.verified.get(eye), outcome.trials.get(eye)
-    return {
+    judged = {
         "verdict": verdict.name,
         "reason": verdict.reason,
+        "probability_better": benefit.probability_better,
+        "depth_after_mm": 1e3 * benefit.depth.after_m,
+    }
+    return {
+        **(judged if is_judged(verdict.name, kind) else {}),
         "target_arcmin": outcome.settings.verdict.target_arcmin,
         "before_arcmin": benefit.without_arcmin,
-        "probability_better": benefit.probability_better,
         "depth_before_mm": 1e3 * benefit.depth.without_m,
-        "depth_after_mm": 1e3 * benefit.depth.after_m,
         "verifications": 1 + len(verification.earlier) if verification else 0,
+        "verified": _yes(is_final and outcome.is_verified(eye)),
         "verification_found_arcmin": verified.before_arcmin if verified else None,
         "trials": trials.count if trials else 0,
         "trials_mean_arcmin": trials.mean_arcmin if trials else None,

@@ -62,7 +62,7 @@ class WearersSummary:
     """Solved eyes, of all sessions."""
     accepted: int
     verified: int
-    """Eyes with the verdict *accept*, and eyes verified by the wearer."""
+    """Eyes whose final φ has the verdict *accept*, and those whose final φ the wearer verified."""
     trials: int
     comparisons: int
     better_with: int
@@ -117,7 +117,7 @@ def summarise_wearers(tables: Mapping[str, Sequence[TableRow]]) -> WearersSummar
         As `table_rows` gives them, those of all sessions one after the other.
     """
     finals = [row for row in tables["parameters.csv"] if row.get("final") == "yes"]
-    solved = [row for row in finals if row.get("verdict")]
+    solved = [row for row in finals if row.get("before_arcmin") is not None]
     values: dict[str, list[tuple[str, float]]] = {
         name: [(_wearer(row), row[name]) for row in solved if row.get(name) is not None]
         for name in ("before_arcmin", "verification_found_arcmin", "expected_error_arcmin")
@@ -128,8 +128,8 @@ def summarise_wearers(tables: Mapping[str, Sequence[TableRow]]) -> WearersSummar
         wearers=len({_wearer(row) for row in finals}),
         sessions=len({row["session"] for row in finals}),
         eyes=len(solved),
-        accepted=sum(row["verdict"] == "accept" for row in solved),
-        verified=sum(row["verification_found_arcmin"] is not None for row in solved),
+        accepted=sum(row.get("verdict") == "accept" for row in solved),
+        verified=sum(row.get("verified") == "yes" for row in solved),
         trials=len(values["trials_error_arcmin"]),
         comparisons=len(better),
         better_with=better.count("applied"),
@@ -218,7 +218,7 @@ def _eyes_table(finals: Sequence[TableRow]) -> Table:
                 row["wearer"] or f"not named, {row['session']}",
                 at_minute(row["begun_utc"]),
                 row["eye"],
-                VERDICT_WORDS[row["verdict"]] if row.get("verdict") else "not solved",
+                _word(row),
                 *(
                     NOTHING if row.get(name) is None else f"{row[name]:.1f}"
                     for name in (
@@ -245,7 +245,7 @@ def _errors_figure(finals: Sequence[TableRow]) -> Figure:
             "after_arcmin": row["expected_error_arcmin"],
         }
         for row in finals
-        if row.get("verdict")
+        if row.get("before_arcmin") is not None
     ]
     return Figure(
         "errors",
@@ -277,6 +277,13 @@ def _draw_errors(ax: Axes, rows: Sequence[FigureRow]) -> None:
     name_axes(ax, "expected error", "arcmin", "")
     if rows:
         ax.legend(title="eye", fontsize=6.5, title_fontsize=6.5, frameon=False)
+
+
+def _word(row: TableRow) -> str:
+    """Return the verdict on the final φ of an eye in a word, or why there is none."""
+    if row.get("verdict"):
+        return VERDICT_WORDS[row["verdict"]]
+    return "not solved" if row.get("before_arcmin") is None else "not judged"
 
 
 def _wearer(row: TableRow) -> str:

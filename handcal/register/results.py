@@ -28,7 +28,7 @@ from handcal.core.types import (
     phi_text,
     shift_rows,
 )
-from handcal.register.benefit import Benefit, expected_arcmin
+from handcal.register.benefit import Benefit, expected_arcmin, expected_error_arcmin
 from handcal.register.fuse import Fused, FuseSettings, fuse_alignments
 from handcal.register.prior import eye_slice
 from handcal.register.solve import solve_alignment
@@ -231,8 +231,11 @@ def conclude(
         benefits={eye: eye_benefit(rig, fused, eye) for eye in fused.shifts},
         advice={eye: advice[eye] for eye in advice if verdicts[eye].name == "repeat"},
         expected_after_another_arcmin={
-            eye: expected_arcmin(
-                rig.eyes[eye], np.zeros(3), another_m2[eye_slice(eye), eye_slice(eye)]
+            eye: min(
+                expected_error_arcmin(rig.eyes[eye], fused.shifts[eye]),
+                expected_arcmin(
+                    rig.eyes[eye], np.zeros(3), another_m2[eye_slice(eye), eye_slice(eye)]
+                ),
             )
             for eye in fused.shifts
         },

@@ -22,6 +22,8 @@ from handcal.register.prior import eye_position_m, eye_slice
 MOST_ALIGNMENTS = 10
 MISFIT = "Drawing and hand differ in a way that no eye explains. Check the rig's depth edges."
 """Said of observations beyond what 95 % of usual wearers make."""
+HARDLY = "More measurements would hardly change that."
+"""Said where no step that can be advised brings *accept* nearer."""
 RMS_MAX_M = 0.005
 """Largest distance of hand and cursor, root mean square, that is not to be repeated."""
 # Least probability that the calibration is better than none. High, as a careless wearer whose few
@@ -34,6 +36,8 @@ _EYE_DISTANCES_M = 0.050, 0.080
 _INLIER_RATIO_MIN = 0.6
 # An eye whose calibration is as probably better as this is drawn with it, although not accepted.
 _LIKELY = 0.8
+# Least gain of probability that is worth a step.
+_LEAST_GAIN = 0.01
 # More than this are not worth it where the offline calibration is within the target.
 _FEW_ALIGNMENTS = 2
 # Each eye in turn, then both, which a wearer sees best and which determines the eyes' common part.
@@ -113,6 +117,8 @@ class Verified:
     """By how much the wearer moved the drawing in the last one, and made it grow."""
     changed_arcmin: float
     """By how much all that is drawn has changed since the first one began."""
+    count: int
+    """Number of the verifications."""
 
 
 def describe_verified(rig: Rig, fused: Fused, eye: Eye, verification: Verification) -> Verified:
@@ -127,6 +133,7 @@ def describe_verified(rig: Rig, fused: Fused, eye: Eye, verification: Verificati
         moved_arcmin=float(np.linalg.norm(moved)),
         moved_size=verification.nudge_size + verification.offset_size,
         changed_arcmin=expected_arcmin(display, changed_m, np.zeros((3, 3))),
+        count=1 + len(verification.earlier),
     )
 
 
@@ -142,15 +149,18 @@ def advise(
     With a plan, those are its next alignments, `upcoming`, and a verification may follow. Without
     one, alignments with this eye alone open are compared with alignments with all solved eyes open.
     """
-    part = eye_slice(eye)
+    part, shift = eye_slice(eye), fused.shifts[eye]
+    now = foreseen_benefit(rig.eyes[eye], shift.shift_m, shift.covariance_m2)
 
     def foresee(eyes: tuple[Eye, ...], count: int, then: Collection[Observation] = ()) -> Advice:
         aligned = [eyes] * count if eyes else upcoming[:count]
         after_arcmin, probability = foreseen_benefit(
             rig.eyes[eye],
-            fused.shifts[eye].shift_m,
+            shift.shift_m,
             fused.foreseen_m2(aligned, tuple(then))[part, part],
         )
+        # It is foreseen for one precision of the wearer, and judged for several: no step harms.
+        after_arcmin, probability = min(after_arcmin, now[0]), max(probability, now[1])
         is_accepted = _is_enough(after_arcmin, probability, settings)
         meets_target = after_arcmin <= settings.target_arcmin
         return Advice(eyes, count, after_arcmin, probability, meets_target, is_accepted, bool(then))
@@ -167,6 +177,15 @@ def advise(
     elif eye in fused.verified and not _best_advice(options).is_accepted:
         options.append(foresee((), 0, [fused.verifiable[eye]]))
     return _best_advice(options)
+
+
+def is_helpful(advice: Advice, gain: Benefit, settings: VerdictSettings) -> bool:
+    """Return whether what is advised can be expected to bring *accept* nearer."""
+    return (
+        advice.is_accepted
+        or advice.probability_better >= gain.probability_better + _LEAST_GAIN
+        or (gain.after_arcmin > settings.target_arcmin and advice.meets_target)
+    )
 
 
 def _best_advice(options: Iterable[Advice]) -> Advice:
@@ -236,13 +255,16 @@ def _with_evidence(verdict: Verdict, fused: Fused, eye: Eye, verified: Verified 
     if (apart_arcmin := fused.apart_arcmin.get(eye)) is not None:
         reasons.append(f"Two verifications of this eye are {apart_arcmin:.1f}′ apart.")
     if verified is not None:
+        last = f" in the last of {verified.count} verifications" if verified.count > 1 else ""
         size = f"{100 * verified.moved_size:+.1f}".replace("-", "\N{MINUS SIGN}")
         reasons.append(
-            f"The wearer moved the drawing by {verified.moved_arcmin:.1f}′ and {size} % in size."
+            f"The wearer moved the drawing by {verified.moved_arcmin:.1f}′ and {size} % in "
+            f"size{last}."
         )
         if verdict.name != "keep":
             changed = verified.changed_arcmin
-            reasons.append(f"What is drawn has changed by {changed:.1f}′ since.")
+            since = "the first began" if verified.count > 1 else "then"
+            reasons.append(f"What is drawn has changed by {changed:.1f}′ since {since}.")
     return replace(verdict, reason=" ".join([*reasons, verdict.reason]))
 
 
@@ -309,6 +331,8 @@ def _judge_benefit(gain: Benefit, advice: Advice, more: str, settings: VerdictSe
 
 def _foreseen(gain: Benefit, advice: Advice, more: str, settings: VerdictSettings) -> list[str]:
     """Return what further steps are expected to change: only what they improve."""
+    if advice.meets_target and not is_helpful(advice, gain, settings):
+        return [HARDLY]
     then = []
     if gain.after_arcmin > settings.target_arcmin and advice.after_arcmin < gain.after_arcmin:
         only = "" if advice.meets_target else "only "

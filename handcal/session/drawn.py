@@ -7,9 +7,10 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from handcal.core.types import EYES, Eye, EyeDisplay, Float64
+from handcal.core.types import EYES, Eye, EyeDisplay, Float64, VerdictName
 from handcal.register.benefit import expected_arcmin
-from handcal.register.results import Results, read_rendered_shift_m, read_solved_shift_m
+from handcal.register.results import USED, Results, read_rendered_shift_m, read_solved_shift_m
+from handcal.register.verdict_words import VERDICT_WORDS
 from handcal.session.record import SessionRecord
 from handcal.session.state import SessionState
 from handcal.session.trial import SAME_SHIFT_M
@@ -75,6 +76,16 @@ def drawn_error_arcmin(results: Results, display: EyeDisplay, eye: Eye, drawn: D
     if drawn.kind == "offline":
         return benefit.without_arcmin
     return expected_arcmin(display, solved.shift_m - drawn.shift_m, solved.covariance_m2)
+
+
+def is_judged(verdict: str, kind: ShiftKind) -> bool:
+    """Return whether the verdict on an eye is about its final φ, and not about one not used."""
+    return kind == "solved" or (kind == "offline" and verdict not in USED)
+
+
+def result_word(verdict: VerdictName, kind: ShiftKind) -> str:
+    """Return the verdict on an eye in a word, or where its φ comes from if that was not judged."""
+    return VERDICT_WORDS[verdict] if is_judged(verdict, kind) else kind.capitalize()
 
 
 def _is_same(shift_m: Float64, other_m: Float64 | None) -> bool:

@@ -9,19 +9,20 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from handcal.core.errors import FileError
 from handcal.core.progress import Progress
-from handcal.core.types import EYES, Eye
+from handcal.core.types import EYES, Eye, VerdictName
 from handcal.io.files import make_folder, read_limited, sync_folder
 from handcal.io.lock import FileLock
 from handcal.register.benefit import expected_arcmin
 from handcal.register.results import RESULTS_VERSION, read_rendered_shift_m, read_solved_shift_m
+from handcal.register.verdict_words import VERDICT_WORDS
 from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
-from handcal.session.drawn import DrawnShift, drawn_shifts
+from handcal.session.drawn import DrawnShift, ShiftKind, drawn_shifts, is_judged, result_word
 from handcal.session.journal import JOURNAL, find_journals, read_journal
 from handcal.session.record import (
     MAX_ALIGNMENT_BYTES,
@@ -34,7 +35,13 @@ from handcal.session.record import (
 )
 from handcal.session.session import Session
 from handcal.session.state import ASIDE, VERIFYING, SessionEvent, SessionState, clean_wearer
-from handcal.session.trial import COMPARED, EyeTrials, judge_trials, trial_errors_arcmin
+from handcal.session.trial import (
+    COMPARED,
+    EyeTrials,
+    is_doubted,
+    judge_trials,
+    trial_errors_arcmin,
+)
 
 _NOTES_CHARACTERS = 200
 _DONE = {SessionEvent.NOTES_SAVED, SessionEvent.REPAIRED, COMPARED, VERIFYING}
@@ -60,6 +67,32 @@ class EyeOutcome:
     """Those of the calibrated φ; None without any."""
     final: str = ""
     """The final φ in words, as `handcal.session.drawn.DrawnShift` gives it; empty if unknown."""
+    kind: ShiftKind | None = None
+    """Where the final φ comes from; None if unknown."""
+    is_verified: bool = False
+    """True if the wearer verified what is final, with the present alignments."""
+
+    @property
+    def is_judged(self) -> bool:
+        """True if the verdict is about the final φ."""
+        return self.kind is None or is_judged(self.verdict, self.kind)
+
+    @property
+    def word(self) -> str:
+        """The verdict in a word, or where a final φ comes from that was not judged."""
+        if self.verdict not in VERDICT_WORDS:
+            return self.verdict
+        return result_word(cast(VerdictName, self.verdict), self.kind or "solved")
+
+    @property
+    def is_accepted(self) -> bool:
+        """True if the verdict on the final φ is *accept*."""
+        return self.verdict == "accept" and self.is_judged
+
+    @property
+    def is_doubted(self) -> bool:
+        """True if trials contradict that."""
+        return self.is_accepted and is_doubted(self.verdict, self.trials)
 
 
 @dataclass(frozen=True, slots=True)
@@ -287,7 +320,12 @@ def eye_outcomes(state: SessionState) -> dict[Eye, EyeOutcome]:
     drawn = drawn_shifts(state)
     solved = read_solved_shift_m(results)
     return {
-        eye: _outcome(eyes[eye], judged.get(eye), drawn[eye] if eye in solved else None)
+        eye: _outcome(
+            eyes[eye],
+            judged.get(eye),
+            drawn[eye] if eye in solved else None,
+            is_verified=eye in state.verified_now,
+        )
         if eye not in solved or drawn[eye].kind in ("solved", "offline")
         else _moved_outcome(state, eye, eyes[eye], judged.get(eye), drawn[eye])
         for eye in EYES
@@ -354,7 +392,11 @@ def _rig_name(path: Path, state: SessionState) -> str:
 
 
 def _outcome(
-    one: Mapping[str, Any], trials: EyeTrials | None, drawn: DrawnShift | None
+    one: Mapping[str, Any],
+    trials: EyeTrials | None,
+    drawn: DrawnShift | None,
+    *,
+    is_verified: bool,
 ) -> EyeOutcome:
     """Return an eye's result; whatever is missing or not a number is unknown."""
     benefit, measured = one.get("benefit"), one.get("measured_arcmin")
@@ -370,6 +412,10 @@ def _outcome(
         _number(found),
         trials,
         str(drawn or ""),
+        drawn.kind if drawn else None,
+        is_verified=is_verified
+        and found is not None
+        and (drawn is None or is_judged(verdict, drawn.kind)),
     )
 
 
@@ -387,7 +433,7 @@ def _moved_outcome(
         solved_m = np.array(one["shift_m"], np.float64)
         covariance_m2 = np.array(one["covariance_m2"], np.float64).reshape(3, 3)
         expected = expected_arcmin(display, solved_m - drawn.shift_m, covariance_m2)
-    outcome = _outcome(one, trials, drawn)
+    outcome = _outcome(one, trials, drawn, is_verified=False)
     return replace(outcome, expected_arcmin=_number(expected), remaining_arcmin=None)
 
 

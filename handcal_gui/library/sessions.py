@@ -8,14 +8,13 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal, TypeAlias, cast
+from typing import Any, Literal, TypeAlias
 
 from handcal.calibration.solve_again import check_solvable
 from handcal.core.errors import CancelledError, FileError, InUseError
 from handcal.core.progress import Progress
-from handcal.core.types import EYES, VerdictName
+from handcal.core.types import EYES
 from handcal.export.wearers import spread
-from handcal.register.verdict_words import VERDICT_WORDS
 from handcal.session.library import (
     EyeOutcome,
     LibraryEntry,
@@ -28,7 +27,6 @@ from handcal.session.library import (
 )
 from handcal.session.record import replay
 from handcal.session.repair import repair_session
-from handcal.session.trial import is_doubted
 from handcal_gui.app.translation import tr
 from handcal_gui.widgets.error_bars import after_arcmin, error_bars, picture_text
 from handcal_gui.widgets.numbers import pluralize
@@ -74,7 +72,7 @@ def is_damaged(entry: LibraryEntry) -> bool:
 
 def is_of(entry: LibraryEntry, kind: Filter) -> bool:
     """Return whether a session is of a kind; one in which nothing was done is only *empty*."""
-    is_accepted = bool(entry.eyes) and all(e.verdict == "accept" for e in entry.eyes.values())
+    is_accepted = bool(entry.eyes) and all(e.is_accepted for e in entry.eyes.values())
     if entry.is_empty or kind == "empty":
         return entry.is_empty and kind == "empty"
     match kind:
@@ -124,8 +122,8 @@ def selection_text(entries: Sequence[LibraryEntry]) -> str:
             sd = "" if found.sd_between is None else f" ± {found.sd_between:.1f}"
             means.append(f"{name} {found.mean:.1f}{sd}′")
     wearers = {entry.wearer or entry.path.name for entry in entries}
-    good = sum(eye.verdict == "accept" for _, eye in eyes)
-    verified = sum(eye.found_arcmin is not None for _, eye in eyes)
+    good = sum(eye.is_accepted for _, eye in eyes)
+    verified = sum(eye.is_verified for _, eye in eyes)
     counts = tr("{}, {}: {} good, {} verified").format(
         pluralize(len(wearers), tr("wearer"), tr("wearers")),
         pluralize(len(eyes), tr("eye"), tr("eyes")),
@@ -335,9 +333,7 @@ def _state(entry: LibraryEntry) -> str:
 
 def _verdicts(entry: LibraryEntry) -> str:
     words = {
-        eye: doubt_word(one.trials.target_arcmin)
-        if one.trials is not None and is_doubted(one.verdict, one.trials)
-        else VERDICT_WORDS.get(cast(VerdictName, one.verdict), one.verdict)
+        eye: doubt_word(one.trials.target_arcmin) if one.trials and one.is_doubted else one.word
         for eye, one in entry.eyes.items()
     }
     return _each_eye(words) or (NOTHING if entry.problem else tr("Not solved"))

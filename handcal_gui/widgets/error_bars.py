@@ -11,7 +11,6 @@ from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPixmap
 
 from handcal.core.types import EYES, Eye, VerdictName
 from handcal.session.library import EyeOutcome
-from handcal.session.trial import is_doubted
 from handcal_gui.app.theme import Colors, colors
 from handcal_gui.app.translation import tr
 from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, VERDICT_COLORS
@@ -84,17 +83,23 @@ def _draw(eyes: tuple[EyeOutcome | None, ...], now: Colors, ratio: float) -> QPi
             continue
         top = 1.0 + i * (2 * _BAR_PX + 4)
         painter.fillRect(_bar(one.before_arcmin, top), QColor(now.muted))
-        doubted = is_doubted(one.verdict, one.trials)
-        known = VERDICT_COLORS.get(cast(VerdictName, one.verdict), "muted")
-        shade = QColor(getattr(now, "warning" if doubted else known))
+        shade = QColor(getattr(now, _shade(one)))
         after = _bar(after_arcmin(one), top + _BAR_PX + 1)
-        if one.verdict == "accept" and not doubted:
+        if one.is_accepted and not one.is_doubted:
             painter.fillRect(after, shade)
         else:
             painter.setPen(shade)
             painter.drawRect(after.adjusted(0.5, 0.5, -0.5, -0.5))
     painter.end()
     return picture
+
+
+def _shade(one: EyeOutcome) -> str:
+    """Return the name of the theme's colour for an eye: none for a φ that was not judged."""
+    if one.is_doubted:
+        return "warning"
+    known = VERDICT_COLORS if one.is_judged else {}
+    return known.get(cast(VerdictName, one.verdict), "muted")
 
 
 def _bar(error_arcmin: float | None, top: float) -> QRectF:

@@ -85,8 +85,8 @@ def test_the_spread_counts_each_wearer_once() -> None:
         row("Anna", "1", "left", 2.0),
         row("Anna", "1", "right", 4.0),
         row("Anna", "2", "left", 3.0, verdict="keep"),
-        row("", "3", "left", 7.0, verification_found_arcmin=5.0),
-        row("Cleo", "4", "left", 8.0, verdict=None, expected_error_arcmin=None),
+        row("", "3", "left", 7.0, verified="yes", verification_found_arcmin=5.0),
+        row("Cleo", "4", "left", 8.0, verdict=None, before_arcmin=None, expected_error_arcmin=None),
     ]
     corners: list[dict[str, object]] = [
         {"wearer": "Anna", "session": "1", "trial": trial, "error_arcmin": error}

@@ -41,6 +41,7 @@ from handcal.register.benefit import expected_error_arcmin
 from handcal.register.verdict_words import VERDICT_WORDS
 from handcal.report.document import Table
 from handcal.report.pdf import compose, write_pdf
+from handcal.session.drawn import DrawnShift
 from handcal.session.journal import Event
 from handcal.session.session import SessionRecord
 from handcal.session.trial import (
@@ -129,13 +130,35 @@ def test_the_verdict_says_that_trials_contradict_it(outcome: SessionOutcome) -> 
     def lead(**changes: object) -> str:
         changed = replace(trial, error_arcmin=np.full(4, 20.7), **changes)  # type: ignore[arg-type]
         record = replace(outcome.record, trials={number: changed})
-        return session_report(replace(outcome, record=record)).lead
+        drawn = dict.fromkeys(EYES, DrawnShift("solved", shift_m, is_drawn=True))
+        return session_report(replace(outcome, record=record, drawn=drawn)).lead
 
     accepted = dict.fromkeys(EYES, Verdict("accept", "as told"))
     outcome = replace(outcome, results=replace(outcome.results, verdicts=accepted))
     said = "Good, but wrong by 20.7′ in its trials (n = 1; target 8′)"
     assert f"Left eye: {said}" in lead(calibrated_shift_m=shift_m)
     assert said not in lead(calibrated_shift_m=shift_m + 1e-3), "a former calibration's"
+
+
+def test_a_phi_set_by_hand_is_not_called_good(outcome: SessionOutcome) -> None:
+    """What was judged, verified and drawn in the figure is the solved φ."""
+    assert outcome.results is not None
+    accepted = dict.fromkeys(EYES, Verdict("accept", "as told"))
+    by_hand = DrawnShift("set by hand", np.array([0.02, 0.0, 0.0]), is_drawn=True)
+    outcome = replace(
+        outcome,
+        results=replace(outcome.results, verdicts=accepted),
+        drawn={**outcome.drawn, "left": by_hand},
+    )
+    report = session_report(outcome)
+    assert report.lead.startswith("Left eye: Set by hand, not judged, error ")
+    assert "Right eye: Good, " in report.lead
+    (reason,) = (
+        item for one in report.sections for item in one.items if str(item).startswith("Left eye, ")
+    )
+    assert str(reason).startswith("Left eye, the solved φ, which is not final (Good): as told")
+    sections = {section.title: section for section in report.sections}
+    assert "left eye is another" in str(sections["Error against distance"].items[0])
 
 
 def test_the_answer_comes_first_and_agrees_with_the_files(
@@ -291,8 +314,8 @@ def test_distances_are_those_of_the_benefit(outcome: SessionOutcome) -> None:
         one.after_high_arcmin for one in of_right
     ]
     sections = {section.title: section for section in session_report(outcome).sections}
-    table = sections["Error against distance"].items[0]
-    assert isinstance(table, Table)
+    items = sections["Error against distance"].items
+    (table,) = (item for item in items if isinstance(item, Table))
     assert [row[4] for row in table.rows] == [one.texts[1] for one in of_right]
 
 

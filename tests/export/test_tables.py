@@ -106,13 +106,18 @@ def test_every_eye_has_one_final_row_whatever_is_drawn(
 def test_final_rows_hold_what_a_study_needs_of_an_eye(
     tmp_path: Path, outcome: SessionOutcome, verified: SessionRecord
 ) -> None:
-    left, _ = (row for row in parameters(tmp_path, outcome) if row["final"] == "yes")
+    rows = parameters(tmp_path, outcome)
+    left, _ = (row for row in rows if row["final"] == "yes")
     assert outcome.results is not None
     benefit, trials = outcome.results.benefits["left"], outcome.trials["left"]
     assert float(left["before_arcmin"]) == benefit.without_arcmin
     assert float(left["expected_error_arcmin"]) == outcome.expected_arcmin("left", "set by hand")
-    assert float(left["probability_better"]) == benefit.probability_better
-    assert float(left["depth_after_mm"]) == 1e3 * benefit.depth.after_m
+    assert left["verdict"] == left["probability_better"] == "", "a φ set by hand is not judged"
+    (solved,) = (row for row in rows if (row["source"], row["eye"]) == ("solved", "left"))
+    assert float(solved["probability_better"]) == benefit.probability_better
+    assert float(solved["depth_after_mm"]) == 1e3 * benefit.depth.after_m
+    offline = next(row for row in rows if row["source"] == "offline")
+    assert offline["verdict"] == offline["verifications"] == offline["before_arcmin"] == ""
     assert float(left["target_arcmin"]) == outcome.settings.verdict.target_arcmin
     assert (left["verifications"], left["verification_found_arcmin"]) == ("0", "")
     assert float(left["trials_mean_arcmin"]) == trials.mean_arcmin
@@ -120,7 +125,8 @@ def test_final_rows_hold_what_a_study_needs_of_an_eye(
     checked = load_outcome(verified)
     rows = parameters(tmp_path, checked)
     assert checked.results is not None
-    assert {row["verifications"] for row in rows} == {"1"}
+    rows = [row for row in rows if row["source"] != "offline"]
+    assert {(row["verifications"], row["verified"]) for row in rows} == {("1", "yes")}
     found = {float(row["verification_found_arcmin"]) for row in rows if row["eye"] == "left"}
     assert found == {checked.results.verified["left"].before_arcmin}
 

@@ -219,8 +219,8 @@ def test_a_verdict_tells_what_the_wearer_moved_and_what_it_changed() -> None:
     advice: dict[Eye, Advice] = {"left": advise(RIG, fused, "left", SETTINGS)}
     told = judge(RIG, fused, advice, SETTINGS, verified={"left": found})["left"].reason
     assert told.startswith(
-        "The wearer moved the drawing by 5.0′ and +0.2 % in size. What is drawn has changed by "
-        f"{found.changed_arcmin:.1f}′ since. "
+        "The wearer moved the drawing by 5.0′ and +0.2 % in size in the last of 2 verifications. "
+        f"What is drawn has changed by {found.changed_arcmin:.1f}′ since the first began. "
     )
     unmoved = _fused({"left": replace(GOOD, shift_m=np.array([0.0002, 0.0, 0.0]))})
     advice = {"left": advise(RIG, unmoved, "left", SETTINGS)}

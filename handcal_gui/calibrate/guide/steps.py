@@ -18,6 +18,7 @@ from handcal.calibration.verifying import VerifyingView
 from handcal.core.types import Eye, Verdict, VerdictName
 from handcal.register.guard import turn_advice
 from handcal.register.results import USED, Results
+from handcal.register.verdict import is_helpful
 from handcal.register.verdict_words import VERDICT_WORDS
 from handcal.report.cells import signed
 from handcal.session.drawn import drawn_shifts
@@ -365,6 +366,13 @@ def _not_accepted_view(preconditions: tuple[Precondition, ...], snapshot: Snapsh
         again.sort(key=lambda eye: -results.benefits[eye].after_arcmin)  # the worse one first
     if any(one.verdict in UNUSABLE for one in preconditions):
         text = tr("Do not use this result. Follow the advice below, then add alignments.")
+    elif results is not None and not any(
+        is_helpful(one, results.benefits[eye], snapshot.settings.solve.verdict)
+        for eye, one in results.advice.items()
+    ):
+        text = tr("Not good yet, and more would hardly change that. Finish as it is, or go on.")
+        main = ButtonSpec(end_action(snapshot), tr("Finish as it is"))
+        return WizardView(Step.VERIFY, text, preconditions, main, _more(snapshot)[:MOST_OTHERS])
     elif again and all(eye in snapshot.record.facts.verified for eye in usable):
         text = tr("Not good yet: verify {} again. Another alignment would change little.").format(
             eye_names(sorted(again))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPalette, QPen
@@ -12,7 +12,13 @@ from PySide6.QtWidgets import QGridLayout, QSizePolicy, QWidget
 from handcal.core.types import EYES, Eye, phi_text
 from handcal.register.results import USED, Results
 from handcal.report.cells import signed
-from handcal.session.drawn import DrawnShift, drawn_error_arcmin, drawn_shifts
+from handcal.session.drawn import (
+    DrawnShift,
+    drawn_error_arcmin,
+    drawn_shifts,
+    is_judged,
+    result_word,
+)
 from handcal.session.record import SessionRecord, eye_trials
 from handcal.session.trial import EyeTrials, is_doubted
 from handcal_gui.app.theme import SPACING_PX, colors, follow_theme, scale_font
@@ -73,57 +79,70 @@ def eye_results(
     found = {}
     for eye in (eye for eye in EYES if eye in results.eyes):
         benefit, verdict = results.benefits[eye], results.verdicts[eye]
-        is_used = verdict.name in USED
+        is_final = is_judged(verdict.name, drawn[eye].kind)
+        is_used = drawn[eye].kind == "solved"
+        arcmin = drawn_error_arcmin(results, record.rig.eyes[eye], eye, drawn[eye])
         details = [tr("Depth error: {}").format(benefit.depth)]
         if is_used:
             another = results.expected_after_another_arcmin[eye]
             details.append(tr("One more alignment: {:.1f}′ expected").format(another))
         given = results, eye, trials.get(eye)
+        bars = _bars(results, eye, trials, is_used=is_used, has_trials=bool(trials))
         found[eye] = EyeResult(
             eye,
             verdict_color(verdict.name, trials.get(eye)),
             verdict_word(*given),
             verdict.name not in ("implausible", "contradicted"),
-            _error(results, record, eye, trials.get(eye)),
-            _drawn(results, record, eye, drawn[eye]),
+            _error(results, record, eye, arcmin, trials.get(eye)),
+            _drawn(drawn[eye]),
             verdict_reason(*given),
-            tuple(_bars(results, eye, trials, has_trials=bool(trials))),
+            bars,
             tuple(details) if is_used else (),
         )
+        if not is_final:
+            reason = tr("The solved φ is not final. It was judged: {}. {}")
+            found[eye] = replace(
+                found[eye],
+                shade="warning" if arcmin > target_arcmin else "muted",
+                word=result_word(verdict.name, drawn[eye].kind),
+                error=tr("{:.1f}′ expected").format(arcmin),
+                reason=reason.format(verdict_word(*given), verdict_reason(*given)),
+                bars=(Bar(tr("Final φ, expected"), arcmin), *bars),
+            )
     return found
 
 
-def _error(results: Results, record: SessionRecord, eye: Eye, trials: EyeTrials | None) -> str:
-    """Return the error of what the verdict has the headset draw with."""
-    benefit, verdict = results.benefits[eye], results.verdicts[eye].name
+def _error(
+    results: Results, record: SessionRecord, eye: Eye, arcmin: float, trials: EyeTrials | None
+) -> str:
+    """Return the error of a final φ that was judged."""
+    verdict = results.verdicts[eye].name
     if trials is not None and is_doubted(verdict, trials):
         return tr("{:.1f}′ in trials").format(trials.mean_arcmin)
-    if verdict == "keep":
-        return tr("{:.1f}′ expected").format(benefit.without_arcmin)
-    if verdict not in USED:
+    if verdict in ("implausible", "contradicted"):
         return ""
-    is_verified = eye in record.verified_now and eye in results.verified
-    text = tr("{:.1f}′ verified") if is_verified else tr("{:.1f}′ expected")
-    return text.format(benefit.after_arcmin)
+    is_verified = verdict in USED and eye in record.verified_now and eye in results.verified
+    return (tr("{:.1f}′ verified") if is_verified else tr("{:.1f}′ expected")).format(arcmin)
 
 
-def _drawn(results: Results, record: SessionRecord, eye: Eye, drawn: DrawnShift) -> str:
-    """Return which φ is final, and the error to expect with one that the verdict is not about."""
+def _drawn(drawn: DrawnShift) -> str:
+    """Return which φ is final."""
     text = tr("Final φ: {}").format(drawn)
     if drawn.kind == "set by hand":
         phi = ", ".join(signed(1e3 * float(one), 2) for one in drawn.shift_m)
         text = tr("{}, ({}) mm").format(text, phi)
-    is_as_judged = (drawn.kind == "solved") == (results.verdicts[eye].name in USED)
-    if is_as_judged and drawn.kind in ("solved", "offline"):
-        return text
-    arcmin = drawn_error_arcmin(results, record.rig.eyes[eye], eye, drawn)
-    return tr("{}; {:.1f}′ expected").format(text, arcmin)
+    return text
 
 
 def _bars(
-    results: Results, eye: Eye, trials: Mapping[Eye, EyeTrials], *, has_trials: bool
-) -> list[Bar]:
-    benefit, is_used = results.benefits[eye], results.verdicts[eye].name in USED
+    results: Results,
+    eye: Eye,
+    trials: Mapping[Eye, EyeTrials],
+    *,
+    is_used: bool,
+    has_trials: bool,
+) -> tuple[Bar, ...]:
+    benefit = results.benefits[eye]
     after_name = tr("After, expected") if is_used else tr("This result, not used")
     bars = [
         Bar(tr("Before, expected"), benefit.without_arcmin, is_judged=False),
@@ -140,7 +159,8 @@ def _bars(
             if found is None
             else Bar(tr("Trials, n = {}").format(found.count), found.mean_arcmin)
         )
-    return sorted(bars, key=lambda bar: bar.arcmin is None)  # the target's line ends before these
+    # The target's line ends before those that were not measured.
+    return tuple(sorted(bars, key=lambda bar: bar.arcmin is None))
 
 
 def result_text(

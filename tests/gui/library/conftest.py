@@ -12,7 +12,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QComboBox, QInputDialog, QPushButton
 from pytestqt.qtbot import QtBot
 
-from handcal.core.types import Alignment
+from handcal.core.types import EYES, Alignment, Verification
 from handcal.register.results import RESULTS_VERSION
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
@@ -40,6 +40,9 @@ def folder(tmp_path: Path, alignment: Alignment) -> Path:
         with Session.create(tmp_path, example_rig(), {}, name=name, wearer=wearer) as session:
             session.save_alignment(alignment)
             if solved is not None:
+                if "measured_arcmin" in solved["eyes"]["left"]:
+                    found = Verification((0.0, 0.0, 0.0), (1.0, 0.0), (0.001, 0.0, 0.0))
+                    session.save_facts(verified=dict.fromkeys(EYES, found))
                 session.save_results(solved)
                 session.finish()
         return session.path

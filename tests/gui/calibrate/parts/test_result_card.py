@@ -98,8 +98,10 @@ def test_the_final_phi_is_the_engines_whatever_was_done_since(
             arcmin = expected_arcmin(
                 record.rig.eyes[eye], final[eye].shift_m - shift.shift_m, shift.covariance_m2
             )
-            is_as_judged = (eye, final[eye].kind) == ("right", "offline")
-            assert (f"{arcmin:.1f}′ expected" in found.drawn) != is_as_judged
+            assert found.error == f"{arcmin:.1f}′ expected"
+            is_judged = eye == "right"
+            assert (found.word == final[eye].kind.capitalize()) != is_judged
+            assert found.shade != "good"
     lines = result_text(results, used, TARGET).splitlines()
     assert [line.split(";")[0] for line in lines if line.startswith("Final φ: solved")]
 
@@ -110,7 +112,7 @@ def test_an_error_is_verified_only_while_its_verification_counts(
     results = with_verdicts(results, "accept", "accept")
     verified = replace(applied(results), verified_now=frozenset({"left"}))
     assert "verified" not in eye_results(results, verified, TARGET)["left"].error
-    results = replace(results, verified={"left": Verified(6.5, 3.0, 6.5, 0.0, 6.5)})
+    results = replace(results, verified={"left": Verified(6.5, 3.0, 6.5, 0.0, 6.5, 1)})
     found = eye_results(results, verified, TARGET)
     assert found["left"].error.endswith("verified")
     assert found["right"].error.endswith("expected")
