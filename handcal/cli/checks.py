@@ -13,7 +13,16 @@ from typing import TYPE_CHECKING, Any
 
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
 from handcal.cli.run import KEYS, LISTEN, paired_headsets
-from handcal.cli.terminal import arg, command, fail, file_option, flag, folder_option, patience
+from handcal.cli.terminal import (
+    arg,
+    command,
+    fail,
+    file_option,
+    flag,
+    folder_option,
+    output_file,
+    patience,
+)
 from handcal.core.errors import HandcalError
 
 if TYPE_CHECKING:
@@ -87,7 +96,7 @@ def doctor(arguments: argparse.Namespace) -> None:
 
 
 @command(
-    file_option("--output", "ZIP file to write", default=Path("handcal-support.zip")),
+    output_file("--output", "ZIP file to write", default="handcal-support.zip"),
     folder_option(
         "--sessions",
         "further folder of sessions whose wearers' names are taken out; may be repeated",

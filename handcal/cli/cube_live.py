@@ -16,6 +16,7 @@ from handcal.cli.terminal import (
     command,
     eyes_of,
     eyes_option,
+    fail,
     file_option,
     flag,
     number,
@@ -121,7 +122,7 @@ def trials(arguments: argparse.Namespace) -> None:
     )
 
     if (arguments.headset == "virtual") != (arguments.camera == "simulator"):
-        raise HandcalError("--headset virtual and --camera simulator go together")
+        fail("--headset virtual and --camera simulator go together", 2)
     settings = TrialSettings(eyes_of(arguments), patience_s=arguments.patience_s)
     made = record_user_trials(
         TrialOrder(arguments.session, arguments.cube, settings),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -15,6 +17,7 @@ from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
 from rich.table import Table
 
+from handcal.cli.terminal import STANDARD_OUTPUT
 from handcal.core.progress import Progress
 from handcal.io.files import make_folder, write_json
 
@@ -40,7 +43,9 @@ def table(*columns: str) -> Table:
 
 def save(path: Path | None, result: dict[str, Any]) -> None:
     """Write a result as JSON, if there is a path; create its folder."""
-    if path is not None:
+    if path == STANDARD_OUTPUT:
+        print(json.dumps(result, indent=2, allow_nan=False), file=sys.__stdout__)
+    elif path is not None:
         make_folder(path.parent)
         write_json(path, result)
 

@@ -24,7 +24,16 @@ from handcal.cli.boards import (
 )
 from handcal.cli.cameras import REALSENSE_OPTIONS, realsense_of
 from handcal.cli.output import console, show_progress, until_interrupted
-from handcal.cli.terminal import arg, command, fail, file_option, folder_option, number, value
+from handcal.cli.terminal import (
+    arg,
+    command,
+    fail,
+    file_option,
+    folder_option,
+    number,
+    output_file,
+    value,
+)
 from handcal.core.errors import HandcalError
 from handcal.io.files import make_folder, write_json
 from handcal.rig.boards.printing import PAPERS
@@ -48,7 +57,7 @@ _CALIBRATION_OPTIONS = (
         help="lens model; auto: the one that best fits images not used to solve it",
     ),
     arg("--drop", nargs="+", default=(), metavar="NAME", help="images to leave out"),
-    file_option("--output", "file for the result (default: only print it)"),
+    output_file("--output", "file for the result (default: only print it)"),
     arg(
         "--format",
         choices=CALIBRATION_FORMATS,
@@ -60,9 +69,9 @@ _CALIBRATION_OPTIONS = (
 
 @command(
     *BOARD_OPTIONS,
-    file_option("--pdf", "PDF at true size, with a ruler to check it"),
+    output_file("--pdf", "PDF at true size, with a ruler to check it"),
     arg("--paper", choices=tuple(PAPERS), default="a4", help="paper size of the PDF"),
-    file_option("--png", "PNG for a screen"),
+    output_file("--png", "PNG for a screen"),
     value("--square-px", number(int, 4, 2000), "PX", "side of a square in the PNG", default=100),
 )
 def board(arguments: argparse.Namespace) -> None:
@@ -84,8 +93,8 @@ def board(arguments: argparse.Namespace) -> None:
             write_png(arguments.png, image)
             size = f"{image.shape[1]}x{image.shape[0]}"
             console.print(f"{arguments.png}: {size} pixels")
-    except ValueError as error:
-        raise HandcalError(str(error)) from error
+    except ValueError as error:  # of the options: the board does not fit
+        fail(str(error), 2)
 
 
 @command(
@@ -226,16 +235,14 @@ def stereo(arguments: argparse.Namespace) -> None:
     """Calibrate the depth camera's pose on the headset from image pairs of one board."""
     import numpy as np
 
-    from handcal.rig.boards.views import pair_views
+    from handcal.rig.boards.views import image_files, pair_views
     from handcal.rig.formats import stereo_json, write_pose
     from handcal.rig.steps import calibrate_depth_camera
 
     if arguments.format == "ros":
-        raise HandcalError(
-            "ROS camera_info has no pose between cameras",
-            "use --format opencv or json",
-        )
+        fail("ROS camera_info has no pose between cameras; use --format opencv or json", 2)
     board = board_of(arguments)
+    image_files(arguments.headset)  # an error before the other images are read, not after it
     pairs = pair_views(
         views_of(arguments.depth, board, arguments.drop), views_of(arguments.headset, board)
     )
@@ -262,7 +269,7 @@ def stereo(arguments: argparse.Namespace) -> None:
 
 @command(
     arg("input", type=Path, help="file by OpenCV, ROS, Kalibr, RealSense, Open3D or Azure Kinect"),
-    arg("output", type=Path, help="file to write"),
+    output_file("--output", "file to write", required=True),
     arg("--format", choices=CALIBRATION_FORMATS, required=True, help="format of the output"),
     arg("--camera", metavar="NAME", help="which camera of the file (default: the first)"),
     arg(

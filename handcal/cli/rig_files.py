@@ -23,11 +23,13 @@ from handcal.cli.run import KEYS, LISTEN
 from handcal.cli.terminal import (
     arg,
     command,
+    fail,
     file_option,
     flag,
     folder_option,
     number,
     one_of,
+    output_file,
     patience,
     value,
 )
@@ -42,7 +44,7 @@ if TYPE_CHECKING:
 
 RIG_AND_OUTPUT = (
     file_option("--rig", "rig file to start from (default: the shipped example)"),
-    file_option("--output", "rig file to write", required=True),
+    output_file("--output", "rig file to write", required=True),
 )
 
 
@@ -76,7 +78,7 @@ def make(arguments: argparse.Namespace) -> None:
     from handcal.rig.steps import identity_in, intrinsics_in, pose_in, with_stereo
 
     if (arguments.stereo is None) == (arguments.factory is None):
-        raise HandcalError("give either --stereo or --factory")
+        fail("give either --stereo or --factory; see handcal rig make --help", 2)
     rig = rig_or_example(arguments.rig)
     if arguments.factory is not None:
         rig = _with_factory_pose(rig, arguments)
@@ -102,7 +104,7 @@ def _with_factory_pose(rig: Rig, arguments: argparse.Namespace) -> Rig:
 
     settings = hololens2_settings(arguments.factory)
     if settings is None or settings.realsense_rig is not None:
-        raise HandcalError(f"--factory: a headset is hololens2:HOST, not {arguments.factory}")
+        fail(f"--factory: a headset is hololens2:HOST, not {arguments.factory}", 2)
     with ExitStack() as stack:
         camera = stack.enter_context(HoloLens2Camera(settings))
         T_H_D = camera.T_H_D
@@ -254,7 +256,7 @@ _DISPLAY = arg(
 
 @command(
     _DISPLAY,
-    file_option("--png", "image to write", required=True),
+    output_file("--png", "image to write", required=True),
     GRID_OPTION,
 )
 def grid(arguments: argparse.Namespace) -> None:
@@ -366,7 +368,7 @@ def display(arguments: argparse.Namespace) -> None:
     size = rig.eyes[eye].width_px, rig.eyes[eye].height_px
     if arguments.gray_code:
         if len(arguments.images) != 1:
-            raise HandcalError("--gray-code takes one folder with the images of all patterns")
+            fail("--gray-code takes one folder with the images of all patterns", 2)
         seen = read_gray_code(arguments.images[0], *size)
         result = calibrate_by_gray_code(rig, eye, seen, camera, viewpoint, inputs)
         flat, bent = flatness_arcmin(seen, camera, *size)

@@ -10,7 +10,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from handcal.cli.output import console, save, show_progress, table, triple
-from handcal.cli.terminal import arg, command, fail, file_option, folder_option, number, value
+from handcal.cli.terminal import (
+    arg,
+    command,
+    fail,
+    file_option,
+    folder_option,
+    number,
+    output_file,
+    value,
+)
 from handcal.core.types import METHODS
 from handcal.export.formats import FORMATS, TOOL_FORMATS
 from handcal.session.record import SessionRecord
@@ -184,7 +193,7 @@ def _say_what_is_left_out(record: SessionRecord) -> None:
     value(
         "--alignment", number(int, 1, 1000), "N", "the alignment shown first (default: the last)"
     ),
-    file_option("--picture", "write a .png file instead of opening a window; needs no display"),
+    output_file("--picture", "write a .png file instead of opening a window; needs no display"),
 )
 def inspect(arguments: argparse.Namespace) -> None:
     """Show a session's clouds, residuals, eyes and displays in a 3D window."""

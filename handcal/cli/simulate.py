@@ -115,6 +115,8 @@ def demo(arguments: argparse.Namespace) -> None:
     from handcal.core.types import EyeDistance
     from handcal.lab.demo import DemoSettings, run_demo
 
+    if arguments.slipped and arguments.former is None:
+        fail("--slipped needs --from SESSION", 2)
     settings = settings_of(DemoSettings, arguments)
     with until_interrupted() as is_stopped, show_progress(is_stopped) as progress:
         rig = _rig_path(arguments.rig)

@@ -15,6 +15,7 @@ from handcal.cli.terminal import (
     Option,
     arg,
     command,
+    fail,
     flag,
     folder_option,
     number,
@@ -181,13 +182,18 @@ def methods(arguments: argparse.Namespace) -> None:
 def procedures(arguments: argparse.Namespace) -> None:
     """Compare calibration procedures on the same simulated wearers."""
     from handcal.lab.settings import ProcedureStudySettings
+    from handcal.lab.study.procedures import require_known
     from handcal.lab.study.studies import run_procedure_study
 
     settings = settings_of(ProcedureStudySettings, arguments)
+    try:
+        require_known(settings)
+    except ValueError as error:
+        fail(str(error), 2)
     rows = _unless_interrupted(partial(run_procedure_study, settings))
     save(arguments.json, {"rows": [asdict(row) for row in rows]})
     shown = table(
-        "", "before", "after", "95 %", "time", "worse", "accepted", "both", "depth", "worse"
+        "plan", "before", "after", "95 %", "time", "worse", "accepted", "both", "depth", "worse"
     )
     for row in rows:
         shown.add_row(
