@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handcal.core.frozen import readonly
+from handcal.core.frozen import readonly, require_kind
 from handcal.core.geometry import invert, project, rigid, transform
 from handcal.core.types import EYES, Bool, Eye, EyeDisplay, Float64, Rig, Solved
 
@@ -137,11 +137,13 @@ def projections(rig: Rig, results: Solved) -> dict[Eye, Float64]:
     ------
     ValueError
         If an eye would lie on or beyond its display's focal plane.
+    TypeError
+        If `rig` is no `Rig`.
 
     Examples
     --------
     >>> import handcal
-    >>> session = handcal.open_session("resources/example_session")
+    >>> session = handcal.example_session()
     >>> P = handcal.projections(session.rig, handcal.solve(session))
     >>> P["left"].shape
     (3, 4)
@@ -149,6 +151,7 @@ def projections(rig: Rig, results: Solved) -> dict[Eye, Float64]:
     >>> print(f"{u / depth:.0f} {v / depth:.0f} px")
     614 369 px
     """
+    require_kind("rig", rig, Rig)
     solved = results.eyes
     return {
         eye: projection_matrix(display, solved[eye].shift_m)

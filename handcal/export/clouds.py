@@ -84,7 +84,7 @@ def read_cloud(path: str | PathLike[str]) -> tuple[Float64, Bool | None]:
     >>> from tempfile import TemporaryDirectory
     >>> from handcal.export.clouds import write_clouds
     >>> from handcal.export.outcome import load_outcome
-    >>> session = handcal.open_session("resources/example_session")
+    >>> session = handcal.example_session()
     >>> with TemporaryDirectory() as folder:
     ...     write_clouds(Path(folder), load_outcome(session))
     ...     cursor_m, cursor_cut = handcal.read_cloud(f"{folder}/alignment-1-cursor.ply")
