@@ -67,7 +67,7 @@ def _study_options(name: str) -> tuple[Option, ...]:
 
 
 @command(
-    flag("--open3d", "solve by Open3D's ICP too (pip install handcal[3d])"),
+    flag("--open3d", "solve by Open3D's ICP too, if it is installed"),
     *_study_options("noise"),
     json=True,
 )

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from handcal.core.errors import FileError, HandcalError
+from handcal.core.errors import FileError, HandcalError, extra_advice
 from handcal.core.progress import Progress
 from handcal.core.types import Bool, Float64
 from handcal.export.outcome import SessionOutcome
@@ -109,7 +109,7 @@ def read_cloud(path: str | PathLike[str]) -> tuple[Float64, Bool | None]:
         import open3d
     except ImportError as error:
         raise HandcalError(
-            "reading clouds needs Open3D, which is not installed", "pip install 'handcal[3d]'"
+            "reading clouds needs Open3D, which is not installed", extra_advice("3d")
         ) from error
     if path.suffix.lower() == ".xyz":
         return _parse_xyz(path, data), None
