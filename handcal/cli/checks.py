@@ -41,6 +41,7 @@ if TYPE_CHECKING:
         default=30,
         help="with --gui: frames per second of the replayed camera",
     ),
+    example="handcal bench --quick --only offline",
     json=True,
 )
 def bench(arguments: argparse.Namespace) -> None:
@@ -78,6 +79,7 @@ def bench(arguments: argparse.Namespace) -> None:
     patience("until the headset connects", 20.0),
     *LISTEN,
     KEYS,
+    example="handcal doctor --rig rig.yaml",
 )
 def doctor(arguments: argparse.Namespace) -> None:
     """Check the installation, the camera and the headset, with advice for each problem."""
@@ -103,6 +105,7 @@ def doctor(arguments: argparse.Namespace) -> None:
         action="append",
     ),
     arg("--frames", type=Path, metavar="RECORDING", help="recording to add: a file or a folder"),
+    example="handcal support --output report.zip --sessions sessions",
 )
 def support(arguments: argparse.Namespace) -> None:
     """Write one file for a bug report: doctor, versions, log without names, frames if wanted."""

@@ -71,6 +71,7 @@ _CAPTURES = (
         default=_USUAL.ids,
         help="markers of the six faces",
     ),
+    example="handcal evaluate cube net --pdf net.pdf --cube cube.json",
 )
 def net(arguments: argparse.Namespace) -> None:
     """Make a cube: its net to print at true size, and the file that describes it."""
@@ -125,6 +126,7 @@ def net(arguments: argparse.Namespace) -> None:
         "take each image once the cube or the grid is at rest, without Enter; between two "
         "images of the cube, cover it",
     ),
+    example="handcal evaluate cube capture captures --camera 0 --automatic",
 )
 def capture(arguments: argparse.Namespace) -> None:
     """Capture the real and the drawn cube with a camera, guided step by step."""
@@ -175,6 +177,7 @@ def capture(arguments: argparse.Namespace) -> None:
         help="prior of the solver: the placement of the camera, or the eye box of wearers",
     ),
     *_RIG_AND_EYE,
+    example="handcal evaluate cube simulate captures --poses 2",
 )
 def simulate(arguments: argparse.Namespace) -> None:
     """Render all captures of a test, with a display calibrated by a simulated hand."""
@@ -193,6 +196,7 @@ def simulate(arguments: argparse.Namespace) -> None:
         "intrinsics of the camera in the eye's place (default: FOLDER/camera.json)",
     ),
     folder_option("--output", "folder for the report", default=Path("results/cube")),
+    example="handcal evaluate cube report captures --output report",
     json=True,
 )
 def report(arguments: argparse.Namespace) -> None:

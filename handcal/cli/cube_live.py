@@ -61,6 +61,7 @@ _CUBE = (
     value("--seconds", number(float, 0.1, 86_400.0), "S", "stop after this time", default=30.0),
     *_CUBE,
     *REALSENSE_OPTIONS,
+    example="handcal evaluate cube track --camera simulator --no-headset --seconds 5",
     json=True,
 )
 def track(arguments: argparse.Namespace) -> None:
@@ -109,6 +110,7 @@ def track(arguments: argparse.Namespace) -> None:
     eyes_option("eyes to record trials for"),
     *_CUBE,
     *REALSENSE_OPTIONS,
+    example="handcal evaluate trials sessions/NAME --cube cube.json",
     json=True,
 )
 def trials(arguments: argparse.Namespace) -> None:

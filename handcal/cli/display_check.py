@@ -58,6 +58,7 @@ _MODES = "obeys", "no-override", "one-for-both", "depth", "infinity", "image-pla
     patience("until a headset connects"),
     *LISTEN,
     KEYS,
+    example="handcal rig display-check --rig rig.yaml --output checked.yaml",
 )
 def display_check(arguments: argparse.Namespace) -> None:
     """Check that a connected headset draws what it is sent, and store the check in a rig file."""

@@ -54,6 +54,7 @@ from handcal.io.files import make_folder, require_suffix
     ),
     output_file("--sheet", "PNG with the worst failures"),
     file_option("--model", "ONNX model (default: the shipped one)"),
+    example="handcal evaluate detector photographs --sheet errors.png",
     json=True,
 )
 def detector(arguments: argparse.Namespace) -> None:
@@ -117,6 +118,7 @@ def detector(arguments: argparse.Namespace) -> None:
     ),
     output_file("--sheet", "PNG with all frames, masks and numbers"),
     folder_option("--output", "folder for a report (default: none)"),
+    example="handcal evaluate segmentation frames --sheet masks.png",
     json=True,
 )
 def segmentation(arguments: argparse.Namespace) -> None:
@@ -150,6 +152,7 @@ def segmentation(arguments: argparse.Namespace) -> None:
 @command(
     arg("folder", type=Path, nargs="+", help="session folder, or a folder of sessions"),
     folder_option("--output", "folder for the report", default=Path("results/users")),
+    example="handcal evaluate users sessions --output report",
     json=True,
 )
 def users(arguments: argparse.Namespace) -> None:

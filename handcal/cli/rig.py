@@ -73,6 +73,7 @@ _CALIBRATION_OPTIONS = (
     arg("--paper", choices=tuple(PAPERS), default="a4", help="paper size of the PDF"),
     output_file("--png", "PNG for a screen"),
     value("--square-px", number(int, 4, 2000), "PX", "side of a square in the PNG", default=100),
+    example="handcal rig board --pdf board.pdf --paper a3",
 )
 def board(arguments: argparse.Namespace) -> None:
     """Make a calibration board: a PDF at true size, or a PNG for a screen."""
@@ -128,6 +129,7 @@ def board(arguments: argparse.Namespace) -> None:
     GRID_OPTION,
     *BOARD_OPTIONS,
     *REALSENSE_OPTIONS,
+    example="handcal rig take realsense --headset 0 --output pairs",
 )
 def take(arguments: argparse.Namespace) -> None:
     """Capture images of a board, or of a display's grid, from a camera, recording or video."""
@@ -170,6 +172,7 @@ def take(arguments: argparse.Namespace) -> None:
 @command(
     arg("images", type=Path, nargs="+", help="images, or folders of images"),
     *_CALIBRATION_OPTIONS,
+    example="handcal rig camera images --output camera.json",
 )
 def camera(arguments: argparse.Namespace) -> None:
     """Calibrate a camera's intrinsics from images of a board."""
@@ -230,6 +233,7 @@ def camera(arguments: argparse.Namespace) -> None:
         "known intrinsics, such as the camera's own (default: solved from the images)",
     ),
     *_CALIBRATION_OPTIONS,
+    example="handcal rig stereo --depth pairs/depth --headset pairs/headset --output stereo.json",
 )
 def stereo(arguments: argparse.Namespace) -> None:
     """Calibrate the depth camera's pose on the headset from image pairs of one board."""
@@ -279,6 +283,7 @@ def stereo(arguments: argparse.Namespace) -> None:
         metavar=("WIDTH", "HEIGHT"),
         help="size of the images in pixels, where the file does not say it",
     ),
+    example="handcal rig convert camchain.yaml --format opencv --output camera.yaml",
 )
 def convert(arguments: argparse.Namespace) -> None:
     """Convert intrinsics or a stereo pose between the files of OpenCV, ROS and handcal."""

@@ -71,6 +71,7 @@ RIG_AND_OUTPUT = (
     file_option("--depth-to-color", "pose from the depth to the colour imager, in the same case"),
     arg("--name", help="name of the rig (default: unchanged)"),
     *RIG_AND_OUTPUT,
+    example="handcal rig make --stereo stereo.json --name Lab --output rig.yaml",
 )
 def make(arguments: argparse.Namespace) -> None:
     """Write the depth camera's pose, from stereo calibration or the factory, into a rig file."""
@@ -127,6 +128,7 @@ def _with_factory_pose(rig: Rig, arguments: argparse.Namespace) -> Rig:
     *RIG_AND_OUTPUT,
     *BOARD_OPTIONS,
     *REALSENSE_OPTIONS,
+    example="handcal rig depth realsense --rig rig.yaml --output checked.yaml",
 )
 def depth(arguments: argparse.Namespace) -> None:
     """Check depth and edges of the depth camera by a board, and store them in a rig file."""
@@ -175,7 +177,7 @@ def depth(arguments: argparse.Namespace) -> None:
     write_rig_file(arguments.output, replace(rig, depth_check=measured))
 
 
-@command(arg("input", type=Path, help="rig file"), json=True)
+@command(arg("input", type=Path, help="rig file"), example="handcal rig check rig.yaml", json=True)
 def check(arguments: argparse.Namespace) -> None:
     """Check a rig file: every field, its plausibility, and how it was calibrated."""
     from handcal.rig.findings import report_rig
@@ -198,6 +200,7 @@ def check(arguments: argparse.Namespace) -> None:
 @command(
     arg("a", type=Path, help="rig file"),
     arg("b", type=Path, help="another rig file"),
+    example="handcal rig compare rig.yaml former.yaml",
     json=True,
 )
 def compare(arguments: argparse.Namespace) -> None:
@@ -258,6 +261,7 @@ _DISPLAY = arg(
     _DISPLAY,
     output_file("--png", "image to write", required=True),
     GRID_OPTION,
+    example="handcal rig grid --display 1268 720 --png grid.png",
 )
 def grid(arguments: argparse.Namespace) -> None:
     """Make the grid that a display shows to the viewpoint camera, pixel for pixel."""
@@ -276,6 +280,7 @@ def grid(arguments: argparse.Namespace) -> None:
 @command(
     _DISPLAY,
     folder_option("--output", "folder for the patterns", required=True),
+    example="handcal rig gray --display 1268 720 --output patterns",
 )
 def gray(arguments: argparse.Namespace) -> None:
     """Make the Gray-code patterns that a display shows one after the other, in place of a grid."""
@@ -340,6 +345,8 @@ def gray(arguments: argparse.Namespace) -> None:
     GRID_OPTION,
     *BOARD_OPTIONS,
     *RIG_AND_OUTPUT,
+    example="handcal rig display grid --eye left --camera-intrinsics camera.json --stereo "
+    "viewpoint.json --distance-m 2 --rig rig.yaml --output rig-left.yaml",
 )
 def display(arguments: argparse.Namespace) -> None:
     """Calibrate one eye's display from the viewpoint camera's images of its grid."""

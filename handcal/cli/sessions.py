@@ -46,6 +46,7 @@ _METRES = number(float, 1e-3, 1e6)
         "its standard deviation",
         default=1.0,
     ),
+    example="handcal solve sessions/NAME --method paper --json -",
     json=True,
 )
 def solve(arguments: argparse.Namespace) -> None:
@@ -107,6 +108,7 @@ def solve(arguments: argparse.Namespace) -> None:
     file_option(
         "--into", "North Star configuration to write northstar into; its trackers stay in it"
     ),
+    example="handcal export sessions/NAME --format report --format csv --output report",
 )
 def export(arguments: argparse.Namespace) -> None:
     """Export sessions: report, tables, calibration, clouds, and the session as one file."""
@@ -149,7 +151,11 @@ def export(arguments: argparse.Namespace) -> None:
         console.print(f"{arguments.into}, as it was in {kept}")
 
 
-@command(arg("session", type=Path, help="session folder"), json=True)
+@command(
+    arg("session", type=Path, help="session folder"),
+    example="handcal session check sessions/NAME",
+    json=True,
+)
 def check(arguments: argparse.Namespace) -> None:
     """Check all of a session, and solve it; exit code 1 if any is bad, 2 if it is none."""
     from handcal.calibration.solve_again import check_solvable
@@ -170,6 +176,7 @@ def check(arguments: argparse.Namespace) -> None:
     arg("session", type=Path, help="session folder; it is not changed"),
     folder_option("--output", "new folder for the copy", required=True),
     file_option("--rig", "rig file, if the session's own is damaged"),
+    example="handcal session repair sessions/NAME --output sessions/repaired",
 )
 def repair(arguments: argparse.Namespace) -> None:
     """Copy the sound parts of a damaged session into a new one."""
@@ -194,6 +201,7 @@ def _say_what_is_left_out(record: SessionRecord) -> None:
         "--alignment", number(int, 1, 1000), "N", "the alignment shown first (default: the last)"
     ),
     output_file("--picture", "write a .png file instead of opening a window; needs no display"),
+    example="handcal inspect sessions/NAME --picture view.png",
 )
 def inspect(arguments: argparse.Namespace) -> None:
     """Show a session's clouds, residuals, eyes and displays in a 3D window."""
@@ -208,6 +216,7 @@ def inspect(arguments: argparse.Namespace) -> None:
 @command(
     arg("folder", type=Path, help="folder of sessions"),
     file_option("--rig", "rig file (default: the shipped example)"),
+    example="handcal prior sessions --rig rig.yaml",
     json=True,
 )
 def prior(arguments: argparse.Namespace) -> None:

@@ -69,6 +69,7 @@ def _study_options(name: str) -> tuple[Option, ...]:
 @command(
     flag("--open3d", "solve by Open3D's ICP too, if it is installed"),
     *_study_options("noise"),
+    example="handcal study noise --quick",
     json=True,
 )
 def noise(arguments: argparse.Namespace) -> None:
@@ -95,6 +96,7 @@ def noise(arguments: argparse.Namespace) -> None:
         dest="noise_wearers",
     ),
     *_study_options("methods"),
+    example="handcal study methods --quick",
     json=True,
 )
 def methods(arguments: argparse.Namespace) -> None:
@@ -177,6 +179,7 @@ def methods(arguments: argparse.Namespace) -> None:
         "--output",
         "folder for this study only; an unfinished study is resumed (default: none is kept)",
     ),
+    example="handcal study procedures --wearers 10 --plan recommended spaam-20",
     json=True,
 )
 def procedures(arguments: argparse.Namespace) -> None:
@@ -217,6 +220,7 @@ def _percent(share: float | None) -> str:
 
 @command(
     arg("folder", type=Path, help="folder 'dataset' of github.com/YutaItoh/HMD-Calibration"),
+    example="handcal study recorded HMD-Calibration/dataset",
     json=True,
 )
 def recorded(arguments: argparse.Namespace) -> None:

@@ -33,21 +33,24 @@ class Command(NamedTuple):
 
     run: Run
     options: tuple[Option, ...]
+    example: str
+    """A command line for the help."""
 
     def add_to(self, parser: Parser) -> None:
         """Add the options to the command's parser."""
         parser.formatter_class = _Help
+        parser.epilog = f"example:\n  {self.example}"
         for add in self.options:
             add(parser)
         parser.set_defaults(command=self.run)
 
 
-def command(*options: Option, json: bool = False) -> Callable[[Run], Command]:
+def command(*options: Option, example: str, json: bool = False) -> Callable[[Run], Command]:
     """Make a function a command with these options; with `json`, also ``--json``."""
     if json:
         purpose = "also write the results as JSON; -: to standard output, and all else to stderr"
         options = (*options, value("--json", _json_file, "FILE", purpose))
-    return lambda run: Command(run, options)
+    return lambda run: Command(run, options, example)
 
 
 def arg(*names: str, **settings: Any) -> Option:
@@ -117,7 +120,10 @@ class Parser(argparse.ArgumentParser):
 
 
 class _Help(argparse.HelpFormatter):
-    """Shows the default of every option that has one."""
+    """Shows the default of every option that has one, and an example in one line, to be copied."""
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        return text if text.startswith("example:") else super()._fill_text(text, width, indent)
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
         default = action.default
