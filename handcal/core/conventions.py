@@ -200,14 +200,6 @@ def opengl_transform(T: Float64) -> Float64:
     return _OPENGL_FROM_OPENCV @ T @ _OPENGL_FROM_OPENCV
 
 
-def unity_transform(T: Float64) -> Float64:
-    """Convert a (4, 4) transform between OpenCV's axes and Unity's left-handed ones, either way.
-
-    ``G T G`` with G = diag(1, -1, 1, 1), which is ``S (F T F) S`` with S = diag(1, 1, -1, 1).
-    """
-    return _UNITY_FROM_OPENCV @ T @ _UNITY_FROM_OPENCV
-
-
 def unity_world_to_camera(T_V_W: Float64) -> Float64:
     """Return Unity's ``Camera.worldToCameraMatrix``: from Unity's world to OpenGL's camera axes."""
     return _OPENGL_FROM_OPENCV @ T_V_W @ _UNITY_FROM_OPENCV

@@ -185,24 +185,6 @@ def target_corners_m(depth_m: float) -> Float64:
     return np.column_stack([x, y, np.full(4, depth_m)])
 
 
-def reprojection_error_px(
-    display: EyeDisplay, shift_m: ArrayLike, true_shift_m: ArrayLike, points_E_m: Float64
-) -> Float64:
-    """Return the (N,) distances on the display between drawn points and their true places.
-
-    Parameters
-    ----------
-    display : EyeDisplay
-    shift_m, true_shift_m : (3,) array_like
-        The shift rendered with, and the true one.
-    points_E_m : (N, 3) float64
-        Points in E.
-    """
-    drawn = project(eye_projection(display, shift_m), points_E_m)
-    needed = project(eye_projection(display, true_shift_m), points_E_m)
-    return np.asarray(np.linalg.norm(drawn - needed, axis=1))
-
-
 @dataclass(frozen=True, slots=True)
 class DrawnMove:
     """The movement of the user test's target on the display when φ changes."""
