@@ -34,10 +34,12 @@ def write_clouds(folder: Path, outcome: SessionOutcome, progress: Progress = Pro
 
     Points are doubles in W, in metres; `is_cut` is 1 at a cut edge. The hand's
     `residual_left_m` and `residual_right_m`, where solved, are each point's distance to its
-    partner on the cursor, NaN for an outlier.
+    partner on the cursor, NaN for an outlier. A comment says what was simulated.
     """
     make_folder(folder)
     solved = outcome.results.alignments if outcome.results else {}
+    simulated = outcome.record.simulated
+    comments = [f"simulated: {simulated}"] if simulated else []
     for done, (number, shifts) in enumerate(solved.items()):
         progress.at(done / len(solved))
         alignment = outcome.record.alignments[number]
@@ -45,12 +47,14 @@ def write_clouds(folder: Path, outcome: SessionOutcome, progress: Progress = Pro
             folder / f"alignment-{number}-cursor.ply",
             alignment.cursor_m,
             properties={"is_cut": alignment.cursor_is_cut.astype(np.uint8)},
+            comments=comments,
         )
         residuals_m = {f"residual_{eye}_m": shift.residuals_m for eye, shift in shifts.items()}
         write_ply(
             folder / f"alignment-{number}-hand.ply",
             alignment.hand_m,
             properties={"is_cut": alignment.hand_is_cut.astype(np.uint8)} | residuals_m,
+            comments=comments,
         )
 
 
