@@ -211,6 +211,8 @@ def inspect(arguments: argparse.Namespace) -> None:
 
     outcome = load_outcome(Session.open(arguments.session))
     inspect_session(outcome, arguments.alignment, arguments.picture)
+    if arguments.picture:
+        console.print(str(arguments.picture))
 
 
 @command(

@@ -63,6 +63,6 @@ def test_only_a_wearer_of_the_virtual_headset_makes_simulated_trials(
         pass
     is_simulated = bool(seed) and headset == "virtual"
     # A simulated one gets farther, and is refused because it is empty.
-    problem = "the left eye is not solved" if is_simulated else "the virtual headset has no such wearer"
+    problem = "left eye is not solved" if is_simulated else "virtual headset has no such wearer"
     with pytest.raises(HandcalError, match=problem):
         run("trials", session.path, "--headset", "virtual", "--camera", "simulator")
