@@ -1,4 +1,4 @@
-"""Draws the tutorial's arrangements and the mount of the depth camera (SVG), and the mount (STL).
+"""Draws the method, the tutorial's arrangements and the mount of the depth camera (SVG; STL).
 
     python docs/drawings.py                          # rewrites docs/pictures/*.svg
     python docs/drawings.py --mount FOLDER --tilt-deg 15 --holes-mm 45
@@ -147,6 +147,133 @@ def mount_svg(mount: Mount) -> str:
     return _svg(x1 + max(foot, 230) + 20, below + 20, parts)
 
 
+HAND = (
+    "M30,130 L30,95 Q8,75 4,58 Q2,48 10,50 Q18,52 24,66 L30,70 L24,22 Q23,12 31,12 Q38,12 39,22"
+    " L44,58 L43,8 Q43,-2 51,-2 Q59,-2 59,8 L60,58 L66,14 Q68,5 75,6 Q82,8 80,17 L74,62 L84,34"
+    " Q88,26 94,29 Q100,32 97,40 L84,84 Q80,98 72,104 L72,130"
+)
+"""Outline of an open hand, 100 px wide and 130 px high."""
+ALIGNMENT = (
+    ("1. Raise the hand", "The depth camera measures it.", (95, 40), None),
+    ("2. The outline freezes", "The cursor is drawn for C0: beside.", (95, 40), (130, 24)),
+    ("3. Align and confirm", "The hand goes under the cursor.", (130, 24), (130, 24)),
+    ("4. Solved: the eye's shift φ", "The outline now lies on the hand.", (95, 40), (95, 40)),
+)
+"""Title and caption of each picture, the place of the hand, and that of the drawn outline."""
+
+
+def alignment_svg() -> str:
+    """Return the drawing of one alignment as the wearer sees it, in four pictures."""
+    parts = []
+    for i, (title, caption, hand, outline) in enumerate(ALIGNMENT):
+        x, y = 10 + 300 * (i % 2), 10 + 250 * (i // 2)
+        parts.append(_box(x, y, 280, 180, "", "#f4f6f8") + _hand(x, y, hand, "#e3b899", "#b98b6c"))
+        if outline:
+            parts.append(_hand(x, y, outline, "none", "#0072b2' stroke-width='4"))
+        parts.append(_text(x, y + 202, title, "font-size='16' font-weight='bold'"))
+        parts.append(_text(x, y + 223, caption, "font-size='15'"))
+    return _svg(600, 502, parts)
+
+
+def _hand(x: float, y: float, place: tuple[int, int], fill: str, stroke: str) -> str:
+    move = f"transform='translate({x + place[0]} {y + place[1]})'"
+    return f"<path d='{HAND}' {move} fill='{fill}' stroke='{stroke}' stroke-linejoin='round'/>"
+
+
+def frames_svg() -> str:
+    """Return the drawing of the model with its frames, from the side and not to scale."""
+    C0, C1, V, H, D, W = (165, 240), (203, 282), (172, 205), (170, 110), (215, 62), (30, 400)
+    pixel, s, d = (590, 148), (460, 193), (420, 185)
+    parts = [
+        _line((590, 70), (590, 350), "#222' stroke-width='3"),
+        _line(C0, pixel, "#0072b2"),
+        _line(C1, pixel, "#b5541c"),
+        _line(C0, C1, "#222", is_arrow=True),
+        _line(H, W, "#888", is_arrow=True),
+        _line(D, H, "#888", is_arrow=True),
+        _line(H, V, "#888", is_arrow=True),
+        _line((165, 330), (590, 330), "#888", is_arrow=True),
+    ]
+    parts += [_dot(*p) for p in (C0, C1, V, H, D, W)]
+    parts += [_dot(*pixel), _dot(*d, "#0072b2"), _dot(*s, "#b5541c")]
+    labels = (
+        (C0, -10, 20, "C0, E", "end"),
+        (C1, 8, 20, "C1: the wearer's eye", "start"),
+        (V, 12, 2, "V: draws", "start"),
+        (H, 14, 10, "H: headset", "start"),
+        (D, 12, 0, "D: depth camera", "start"),
+        (W, 10, 20, "W: world (the room)", "start"),
+        ((184, 261), 8, -4, "φ", "start"),
+        (d, -6, -12, "d: the cursor's point", "end"),
+        (s, -40, 34, "s: the hand's point", "start"),
+        (pixel, -8, -18, "one pixel", "end"),
+        ((590, 70), 0, -12, "S: virtual screen", "end"),
+        ((377, 330), 0, 22, "z(C0→S)", "middle"),
+        ((171, 160), 8, 4, "T_V_H", "start"),
+        ((193, 86), -8, 0, "T_H_D", "end"),
+        ((90, 276), -8, 0, "T_W_H", "end"),
+    )
+    for (x, y), dx, dy, label, anchor in labels:
+        parts.append(_text(x + dx, y + dy, label, f"font-size='15' text-anchor='{anchor}'"))
+    return _svg(620, 440, [_ARROW, *parts])
+
+
+def head_svg() -> str:
+    """Return the drawing of the devices on the head, from the side, as in the example rig."""
+    camera, eye = (236, 66), (188, 178)
+    look = math.radians(15)
+    wide = math.radians(20)
+    parts = [
+        "<path d='M200,260 Q188,300 150,300 L60,300 L60,250 Q20,180 60,110 Q110,50 170,90"
+        " Q200,120 198,170 L216,206 L200,214 z' fill='#e3b899' stroke='#b98b6c'/>",
+        _box(40, 104, 180, 26, "", "#c9d3de"),
+        _box(196, 112, 34, 34, ""),
+        _line((226, 146), (256, 214), "#222' stroke-width='4"),
+        _line((216, 110), (228, 78), "#222' stroke-width='4"),
+        f"<rect x='-16' y='-12' width='32' height='24' fill='#dde6f0' stroke='#222'"
+        f" transform='translate({camera[0]} {camera[1]}) rotate(15)'/>",
+        _dot(*eye),
+    ]
+    for angle in (look - wide, look, look + wide):
+        end = camera[0] + 300 * math.cos(angle), camera[1] + 300 * math.sin(angle)
+        dashes = "#888' stroke-dasharray='5 4" if angle == look else "#888"
+        parts.append(_line(camera, end, dashes))
+    parts.append(_line(eye, (474, 178), "#0072b2"))
+    parts.append(_hand(392, 108, (0, 0), "#e3b899", "#b98b6c"))
+    parts.append(_line((188, 330), (440, 330), "#888", is_arrow=True))
+    parts.append(_line((20, 178), (20, 66), "#888", is_arrow=True))
+    labels = (
+        (262, 26, "D: depth camera, 15° down", "start"),
+        (40, 96, "H: headset", "start"),
+        (180, 170, "eye", "end"),
+        (264, 224, "display", "start"),
+        (314, 352, "hand at 0.4 to 0.6 m", "middle"),
+        (28, 74, "7 cm above the eye", "start"),
+    )
+    parts += [_text(x, y, words, f"font-size='15' text-anchor='{a}'") for x, y, words, a in labels]
+    return _svg(540, 370, [_ARROW, *parts])
+
+
+METHOD = {"alignment": alignment_svg, "frames": frames_svg, "head": head_svg}
+"""The drawings of the method, by their names."""
+_ARROW = (
+    "<defs><marker id='end' markerWidth='9' markerHeight='9' refX='8' refY='4' orient='auto'>"
+    "<path d='M0,0 L9,4 L0,8 z' fill='#444'/></marker></defs>"
+)
+
+
+def _line(
+    start: tuple[float, float], end: tuple[float, float], stroke: str, *, is_arrow: bool = False
+) -> str:
+    ends = f"x1='{start[0]:.1f}' y1='{start[1]:.1f}' x2='{end[0]:.1f}' y2='{end[1]:.1f}'"
+    head = " marker-end='url(#end)'" if is_arrow else ""
+    return f"<line {ends} stroke='{stroke}'{head}/>"
+
+
+def _dot(x: float, y: float, fill: str = "#222") -> str:
+    return f"<circle cx='{x}' cy='{y}' r='5' fill='{fill}'/>"
+
+
 ARRANGEMENTS = {
     "setup-stereo": (
         "Depth and headset camera:\none board, seen by both",
@@ -252,6 +379,8 @@ def main() -> None:
         return
     for name in ARRANGEMENTS:
         (folder / f"{name}.svg").write_text(arrangement_svg(name), "utf-8")
+    for name, draw in METHOD.items():
+        (folder / f"{name}.svg").write_text(draw(), "utf-8")
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ ROOT_PAGES = ("CHANGELOG.md", "CONTRIBUTING.md", "THIRD-PARTY.md")
 LOGO = "resources/icons/handcal.svg"
 _OUTSIDE = re.compile(r"\]\(\.\./([^)#\s]+)")
 _CODE = re.compile(r"<code>[^<]*</code>")
+_FROM_ROOT = re.compile(r'"/([\w"])')
 _AT_ROOT = re.compile(r"\]\((?!docs/|https?:|#)([^)#\s]+)")
 
 
@@ -44,3 +45,11 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
 def on_page_content(html: str, page: Page, config: MkDocsConfig, files: Files) -> str:  # noqa: ARG001
     """Remove the backslashes before bars, which code in tables needs only in Markdown."""
     return _CODE.sub(lambda code: code[0].replace("\\|", "|"), html)
+
+
+def on_post_template(html: str, template_name: str, config: MkDocsConfig) -> str:  # noqa: ARG001
+    """Make the links of the page for missing pages relative: nobody knows where the site will be.
+
+    All pages are in the root of the site, and so are those that may be missing.
+    """
+    return _FROM_ROOT.sub(r'"./\1', html) if template_name == "404.html" else html

@@ -15,7 +15,7 @@ from importlib.abc import InspectLoader
 from importlib.util import find_spec
 from io import TextIOWrapper
 from types import CodeType
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 from handcal.cli.terminal import STANDARD_OUTPUT, Command, Parser, errors_in_one_line
 
@@ -161,8 +161,8 @@ def purpose(name: str, module: str) -> str:
     """
     spec = find_spec(f"handcal.cli.{module}")
     assert spec is not None
-    assert isinstance(spec.loader, InspectLoader)
-    code = spec.loader.get_code(spec.name)
+    # Not asserted: the loader of a packaged program has the method without the class.
+    code = cast(InspectLoader, spec.loader).get_code(spec.name)
     assert code is not None
     functions = (part for part in code.co_consts if isinstance(part, CodeType))
     function = next(part for part in functions if part.co_name == name.replace("-", "_"))

@@ -136,7 +136,7 @@ def find_color_edge(
     return ColorEdge(
         np.interp(at, chosen, found_px, period=turn),
         np.interp(at, chosen, is_told.astype(np.float64), period=turn) > 0.5,
-        float(at_ends.sum() / max(1, is_told.sum())),
+        int(at_ends.sum()) / max(1, int(is_told.sum())),
     )
 
 

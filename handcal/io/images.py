@@ -93,7 +93,9 @@ def read_grey(path: Path) -> UInt8:
     if image.dtype == np.uint8:
         return image
     values = np.nan_to_num(image.astype(np.float32), posinf=0.0, neginf=0.0)
-    return np.asarray(np.clip(values * (255.0 / max(values.max(), 1e-9)), 0.0, 255.0), np.uint8)
+    return np.asarray(
+        np.clip(values * (255.0 / max(float(values.max()), 1e-9)), 0.0, 255.0), np.uint8
+    )
 
 
 def image_named(folder: Path, name: str) -> Path:

@@ -199,7 +199,7 @@ class ShapeChange:
     def without_opening(self, share: float) -> ShapeChange:
         """Return the change without a share of its uniform change of size."""
         out_m = self.nodes_m - self.nodes_m.mean(axis=0)
-        growth = np.vdot(self.moved_m, out_m) / max(np.vdot(out_m, out_m), 1e-18)
+        growth = float(np.vdot(self.moved_m, out_m)) / max(float(np.vdot(out_m, out_m)), 1e-18)
         return replace(self, moved_m=self.moved_m - share * growth * out_m)
 
 

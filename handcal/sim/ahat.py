@@ -143,8 +143,8 @@ def _by_phase(
 ) -> tuple[UInt16, UInt16]:
     """Return distance and brightness of surfaces by the phase of their light, which adds up."""
     phase = 2.0 * np.pi / ALIAS_M * (distance_m + settings.offset_m)
-    parts = np.dstack([returned * np.cos(phase), returned * np.sin(phase)])
-    parts = np.asarray(cv2.GaussianBlur(parts, (0, 0), settings.blur_px), np.float64)
+    sharp = np.dstack([returned * np.cos(phase), returned * np.sin(phase)]).astype(np.float64)
+    parts: Float64 = np.asarray(cv2.GaussianBlur(sharp, (0, 0), settings.blur_px), np.float64)
     parts += rng.normal(0.0, settings.noise, parts.shape)
     brightness = np.hypot(parts[..., 0], parts[..., 1])
     turns = np.arctan2(parts[..., 1], parts[..., 0]) / (2.0 * np.pi) % 1.0

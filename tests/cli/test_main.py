@@ -11,12 +11,16 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from importlib.abc import InspectLoader
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
+from handcal.cli.main import purpose
 from handcal.cli.output import console
 from handcal.core.progress import Progress
 from handcal.core.types import Alignment
@@ -357,3 +361,16 @@ def test_a_depth_scale_in_units_per_metre_is_explained(text: str, hint: str) -> 
         [sys.executable, *command.split(), text], capture_output=True, text=True, check=False
     )
     assert f"{text!r} is not a number from 1e-06 to 0.1{hint}" in ran.stderr
+
+
+def test_a_packaged_programs_loader_tells_the_purposes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """PyInstaller's loader has `get_code`, but is none of Python's classes."""
+
+    def packaged(name: str) -> SimpleNamespace:
+        real = find_spec(name)
+        assert real is not None
+        loader = cast(InspectLoader, real.loader)
+        return SimpleNamespace(name=name, loader=SimpleNamespace(get_code=loader.get_code))
+
+    monkeypatch.setattr("handcal.cli.main.find_spec", packaged)
+    assert "calibrat" in purpose("demo", "simulate").lower()

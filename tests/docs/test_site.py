@@ -41,6 +41,21 @@ def test_every_public_name_is_described(site: Path) -> None:
             assert re.search(rf'id="handcal\.{name}"', text), name
 
 
+def test_the_site_can_be_searched_without_a_server(site: Path) -> None:
+    """The worker and the index are loaded as scripts, as a browser gives neither from a file."""
+    html = (site / "guide.html").read_text("utf-8")
+    assert html.index('src="iframe-worker.js"') < html.index('src="assets/javascripts/bundle')
+    assert (site / "iframe-worker.js").exists()
+    assert (site / "search/search_index.js").read_text("utf-8").startswith("var __index")
+
+
+def test_the_page_for_missing_pages_has_links_that_lead_somewhere(site: Path) -> None:
+    links = re.findall(r'(?:href|src)="([^"#]+)', (site / "404.html").read_text("utf-8"))
+    here = [link for link in links if not link.startswith("https:")]
+    assert "./guide.html" in here
+    assert not [link for link in here if link[0] == "/" or not (site / link).exists()]
+
+
 def test_the_site_asks_nothing_of_the_network(site: Path) -> None:
     loaded = re.compile(r"<(?:link[^>]+stylesheet|script|img)[^>]+(?:href|src)=\"?https?:")
     for page in site.glob("*.html"):

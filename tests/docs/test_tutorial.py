@@ -101,3 +101,6 @@ def test_the_drawings_are_those_of_the_script(drawings: ModuleType) -> None:
         ET.fromstring(svg)
         assert (pictures / f"{name}.svg").read_text("utf-8") == svg
         assert f"pictures/{name}.svg" in TUTORIAL
+    for name, draw in drawings.METHOD.items():
+        assert (pictures / f"{name}.svg").read_text("utf-8") == draw()
+        ET.fromstring(draw())
