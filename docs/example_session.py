@@ -31,7 +31,8 @@ def main() -> None:
     """Make the session, and put it among the resources."""
     rng = np.random.default_rng(SEED)
     wearer = draw_wearer(rng, SEED, WearerSettings())
-    settings = {"calibration": settings_json(CalibrationSettings())}
+    simulated = {"source": "simulator", "headset": "virtual"}
+    settings = {"calibration": settings_json(CalibrationSettings()), "station": simulated}
     with tempfile.TemporaryDirectory() as scratch:
         with Session.create(
             Path(scratch), wearer.rig, settings, name="example", wearer="Simulated wearer"

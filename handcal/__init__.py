@@ -1,7 +1,7 @@
 """handcal: calibrate an optical see-through headset with the wearer's bare hand.
 
 >>> import handcal
->>> session = handcal.open_session("resources/example_session")
+>>> session = handcal.example_session()
 >>> results = handcal.solve(session)
 >>> print(results.eyes["left"])
 φ = (+4.20 ± 1.14, -4.39 ± 0.96, +0.91 ± 2.54) mm; rms 1.55 mm, 97 % inliers, converged
@@ -15,31 +15,49 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from handcal.calibration.solve_again import solve
     from handcal.camera.images import read_frame
-    from handcal.core.conventions import to_opengl, to_openxr, to_unity
+    from handcal.core.conventions import EyeCamera, Fov, Pose, to_opengl, to_openxr, to_unity
     from handcal.core.display import projections, update_matrix
     from handcal.core.errors import HandcalError, HandError
-    from handcal.core.types import Alignment, EyeDistance, EyeShift, Frame, HandCloud, Rig
+    from handcal.core.types import (
+        Alignment,
+        EyeDistance,
+        EyeShift,
+        Frame,
+        HandCloud,
+        Intrinsics,
+        Rig,
+    )
     from handcal.export.clouds import read_cloud
     from handcal.hand.shipped import segment
     from handcal.register.guard import rotation_between
     from handcal.register.results import Results
     from handcal.register.solve import solve_eye_shift
+    from handcal.rig.example import example_rig
     from handcal.rig.rig_file import read_rig, write_rig
-    from handcal.session.session import open_session
+    from handcal.session.record import SessionRecord
+    from handcal.session.session import example_session, open_session
+    from handcal.sim.camera import simulated_frame
 
     __version__: str
 
 __all__ = [
     "Alignment",
+    "EyeCamera",
     "EyeDistance",
     "EyeShift",
+    "Fov",
     "Frame",
     "HandCloud",
     "HandError",
     "HandcalError",
+    "Intrinsics",
+    "Pose",
     "Results",
     "Rig",
+    "SessionRecord",
     "__version__",
+    "example_rig",
+    "example_session",
     "open_session",
     "projections",
     "read_cloud",
@@ -47,6 +65,7 @@ __all__ = [
     "read_rig",
     "rotation_between",
     "segment",
+    "simulated_frame",
     "solve",
     "solve_eye_shift",
     "to_opengl",
@@ -59,17 +78,28 @@ __all__ = [
 _HOMES = {
     "calibration.solve_again": ("solve",),
     "camera.images": ("read_frame",),
-    "core.conventions": ("to_opengl", "to_openxr", "to_unity"),
+    "core.conventions": ("EyeCamera", "Fov", "Pose", "to_opengl", "to_openxr", "to_unity"),
     "core.display": ("projections", "update_matrix"),
     "core.errors": ("HandError", "HandcalError"),
-    "core.types": ("Alignment", "EyeDistance", "EyeShift", "Frame", "HandCloud", "Rig"),
+    "core.types": (
+        "Alignment",
+        "EyeDistance",
+        "EyeShift",
+        "Frame",
+        "HandCloud",
+        "Intrinsics",
+        "Rig",
+    ),
     "export.clouds": ("read_cloud",),
     "hand.shipped": ("segment",),
     "register.guard": ("rotation_between",),
     "register.results": ("Results",),
     "register.solve": ("solve_eye_shift",),
+    "rig.example": ("example_rig",),
     "rig.rig_file": ("read_rig", "write_rig"),
-    "session.session": ("open_session",),
+    "session.record": ("SessionRecord",),
+    "session.session": ("example_session", "open_session"),
+    "sim.camera": ("simulated_frame",),
 }
 _HOME_OF = {name: f"handcal.{home}" for home, names in _HOMES.items() for name in names}
 

@@ -93,6 +93,7 @@ make_deb() {
     ln -s /opt/handcal/handcal-gui "$root/usr/bin/handcal-gui"
     ln -s /opt/handcal/handcal-gui "$root/usr/bin/handcal" # the name makes it the command line
     install -Dm644 installer/linux/handcal.desktop -t "$root/usr/share/applications"
+    install -Dm644 installer/linux/handcal.bash "$root/usr/share/bash-completion/completions/handcal"
     install -Dm644 resources/icons/handcal.svg -t "$root/usr/share/icons/hicolor/scalable/apps"
     install -Dm644 installer/linux/60-handcal-realsense.rules -t "$root/lib/udev/rules.d"
     cat LICENSE THIRD-PARTY.md >"$root/usr/share/doc/handcal/copyright"

@@ -11,9 +11,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
+import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
-from handcal.core.types import Intrinsics
+from handcal.core.display import eye_projection
+from handcal.core.geometry import project
+from handcal.core.types import EyeDisplay, Float64, Intrinsics
 from handcal.io.resources import resource_path
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig
@@ -154,3 +158,18 @@ def write_thin_session(folder: Path) -> Path:
                 )
             )
     return session.path
+
+
+def reprojection_error_px(
+    display: EyeDisplay, shift_m: ArrayLike, true_shift_m: ArrayLike, points_E_m: Float64
+) -> Float64:
+    """Return the (N,) distances on the display between drawn points (N, 3) and their places."""
+    drawn = project(eye_projection(display, shift_m), points_E_m)
+    needed = project(eye_projection(display, true_shift_m), points_E_m)
+    return np.asarray(np.linalg.norm(drawn - needed, axis=1))
+
+
+def unity_transform(T: Float64) -> Float64:
+    """Convert a (4, 4) transform between OpenCV's axes and Unity's left-handed ones, either way."""
+    flip = np.diag([1.0, -1.0, 1.0, 1.0])
+    return flip @ T @ flip

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import doctest
 import importlib
+import inspect
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -26,23 +28,15 @@ from handcal.session.session import SessionRecord
 from handcal.sim.camera import simulated_frame
 from tests.helpers import ROOT
 
-THE_TEN_LINES = """
-import handcal
-session = handcal.open_session("resources/example_session")
-results = handcal.solve(session)
-print(results); print(results.eyes["left"])
-other = handcal.solve(session, method="paper")
-P = handcal.projections(session.rig, results)
-frame = handcal.read_frame("color.png", "depth.png", "intrinsics.json")
-hand = handcal.segment(frame)
-rig = handcal.read_rig("resources/example_rig.yaml")
-U = handcal.to_unity(rig, results)
-"""
+THE_BLOCKS = re.findall(
+    r"```python\n(.*?)```", (ROOT / "docs/api.md").read_text("utf-8"), re.DOTALL
+)
 PUBLIC = {
     "open_session", "solve", "projections", "read_cloud", "read_frame", "segment", "read_rig",
     "write_rig",
     "HandcalError", "HandError", "Frame", "HandCloud", "Alignment", "EyeDistance", "EyeShift",
-    "Rig", "Results",
+    "Rig", "Results", "EyeCamera", "Fov", "Intrinsics", "Pose", "SessionRecord",
+    "example_rig", "example_session", "simulated_frame",
     "to_unity", "to_opengl", "to_openxr", "__version__",
     "solve_eye_shift", "update_matrix", "rotation_between",
 }  # fmt: skip
@@ -50,6 +44,7 @@ FUNCTIONS = sorted(name for name in PUBLIC - {"__version__"} if name.islower())
 LEFT_LINE = (
     "φ = (+4.20 ± 1.14, -4.39 ± 0.96, +0.91 ± 2.54) mm; rms 1.55 mm, 97 % inliers, converged"
 )
+HAND_LINE = "a hand 0.48 m from the camera"
 RESULTS_LINE = (
     "consistent, 2 alignments: "
     "left φ = (+4.20 ± 1.14, -4.39 ± 0.96, +0.91 ± 2.54) mm, accept; "
@@ -69,26 +64,22 @@ def results(session: SessionRecord) -> Results:
 
 @pytest.fixture(scope="module")
 def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a simulated frame as files, beside the shipped resources."""
+    """A folder with a simulated frame as files."""
     folder = tmp_path_factory.mktemp("notebook")
     write_frame(folder, simulated_frame(seed=1))
-    (folder / "resources").symlink_to(ROOT / "resources", target_is_directory=True)
     return folder
 
 
-def test_the_ten_lines_work_as_written(
-    pictures: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_the_page_s_notebook_runs_in_an_empty_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.chdir(pictures)
+    monkeypatch.chdir(tmp_path)
     said: dict[str, Any] = {}
-    exec(THE_TEN_LINES, said)
-    assert capsys.readouterr().out.splitlines() == [RESULTS_LINE, LEFT_LINE]
-    assert said["results"].method == "consistent"
-    assert said["other"].method == "paper"
+    for block in THE_BLOCKS:
+        exec(block, said)
+    assert capsys.readouterr().out.splitlines() == [RESULTS_LINE, LEFT_LINE, HAND_LINE]
     assert {eye: P.shape for eye, P in said["P"].items()} == {"left": (3, 4), "right": (3, 4)}
-    assert isinstance(said["hand"], handcal.HandCloud)
-    assert 0.45 < said["hand"].median_depth_m < 0.55
-    assert set(said["U"]) == set(EYES)
+    assert set(said["unity"]) == set(EYES)
 
 
 def test_completion_offers_exactly_the_public_names() -> None:
@@ -117,6 +108,7 @@ def test_paths_may_be_text_or_path(
     color, depth, intrinsics = (kind(pictures / name) for name in names)
     frame = handcal.read_frame(color, depth, intrinsics)
     assert len(session.alignments) == 2
+    assert len(handcal.solve(kind(session.path)).alignments) == 2
     assert handcal.read_rig(kind(tmp_path / "rig.yaml")).name == rig.name
     np.testing.assert_array_equal(frame.depth, simulated_frame(seed=1).depth)
 
@@ -125,11 +117,12 @@ def test_paths_may_be_text_or_path(
     "wrong",
     [
         lambda path: handcal.open_session(path),
+        lambda path: handcal.solve(path),
         lambda path: handcal.read_rig(path),
         lambda path: handcal.read_frame(path, path, path),
         lambda path: handcal.write_rig(Path(path) / "rig.yaml", example_rig()),
     ],
-    ids=["open_session", "read_rig", "read_frame", "write_rig"],
+    ids=["open_session", "solve", "read_rig", "read_frame", "write_rig"],
 )
 @pytest.mark.parametrize("path", ["missing", "a_file"])
 def test_a_wrong_path_is_one_line(
@@ -147,6 +140,34 @@ def test_unknown_choices_are_refused_by_name(session: SessionRecord) -> None:
         handcal.solve(session, method="best")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="unknown roi 'all': choose from detector, left"):
         handcal.segment(simulated_frame(), roi="all")  # type: ignore[arg-type]
+
+
+def test_an_argument_of_another_kind_is_named(results: Results) -> None:
+    with pytest.raises(TypeError, match="frame must be of type Frame, not NoneType"):
+        handcal.segment(None)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="rig must be of type Rig, not str"):
+        handcal.to_unity("rig.yaml", results)  # type: ignore[arg-type]
+
+
+def documented(kind: type) -> dict[str, str]:
+    """Return the text of each name in a docstring's section Attributes."""
+    _, _, section = (inspect.getdoc(kind) or "").partition("Attributes\n----------\n")
+    section = re.split(r"\n\n\w+\n---", section)[0]
+    entries = re.findall(r"^(\w.*)\n((?: {4}.*(?:\n|$))*)", section, re.MULTILINE)
+    return {name: text.strip() for names, text in entries for name in names.split(", ")}
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [one for name in sorted(PUBLIC) if is_dataclass(one := getattr(handcal, name))],
+)
+def test_help_explains_every_field_and_property(kind: type) -> None:
+    texts = documented(kind)
+    assert list(texts) == [field.name for field in fields(kind)]
+    assert all(texts.values())
+    for name, value in vars(kind).items():
+        if isinstance(value, property) and not name.startswith("_"):
+            assert value.__doc__, name
 
 
 @pytest.mark.parametrize("roi", ["detector", "left", "right", "depth"])
@@ -214,8 +235,10 @@ def test_what_did_not_converge_says_so(results: Results) -> None:
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_the_docstring_has_an_example_that_runs(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(ROOT)
+def test_the_docstring_has_an_example_that_runs(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     function = getattr(handcal, name)
     home = vars(importlib.import_module(function.__module__))
     (example,) = doctest.DocTestFinder(recurse=False).find(function, name, globs=dict(home))

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from handcal.core.errors import HandcalError
+from handcal.core.errors import HandcalError, extra_advice
 from handcal.station.snapshot import Snapshot
 
 STREAM_NAME = "handcal"
@@ -43,9 +43,7 @@ class LslOutput:
         try:
             import pylsl
         except (ImportError, RuntimeError) as error:  # the latter without the library liblsl
-            raise HandcalError(
-                "Lab Streaming Layer needs pylsl", "pip install 'handcal[lsl]'"
-            ) from error
+            raise HandcalError("Lab Streaming Layer needs pylsl", extra_advice("lsl")) from error
         self._clock = pylsl.local_clock
         info = pylsl.StreamInfo(STREAM_NAME, STREAM_TYPE, 1, 0.0, pylsl.cf_string, source_id)
         self._outlet: Any = pylsl.StreamOutlet(info)

@@ -17,7 +17,7 @@ import numpy as np
 
 from handcal.core.conventions import slicer_points_mm, slicer_transform
 from handcal.core.display import projection_matrix
-from handcal.core.errors import HandcalError, LinkError
+from handcal.core.errors import HandcalError, LinkError, extra_advice
 from handcal.core.geometry import invert
 from handcal.core.types import EYES, Float64
 from handcal.station.snapshot import Snapshot
@@ -63,9 +63,7 @@ class SlicerOutput:
         try:
             import pyigtl  # noqa: F401
         except ImportError as error:
-            raise HandcalError(
-                "OpenIGTLink needs pyigtl", "pip install 'handcal[slicer]'"
-            ) from error
+            raise HandcalError("OpenIGTLink needs pyigtl", extra_advice("slicer")) from error
         self._tell = tell
         self._send_s = send_s
         self._clients: list[_Client] = []

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -19,11 +20,11 @@ from handcal.register.prior import LearnedPrior, posterior, widened
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.session.journal import Damage
 from handcal.session.repair import SessionCheck, check_session, without_unsolvable
-from handcal.session.session import Session, SessionRecord
+from handcal.session.session import Session, SessionRecord, open_session
 
 
 def solve(
-    session: SessionRecord,
+    session: SessionRecord | str | PathLike[str],
     *,
     method: Method | None = None,
     eye_distance: EyeDistance | None = None,
@@ -32,8 +33,8 @@ def solve(
 
     Parameters
     ----------
-    session : SessionRecord
-        From `handcal.open_session`; it stays as it is.
+    session : SessionRecord or path
+        From `handcal.open_session`, or the session's folder; it stays as it is.
     method : {"consistent", "paper", "linear", "icp", "icp-open3d"}, optional
         Solver of each alignment, the session's own if not given. ``paper``: Hu et al. 2021 as
         published. ``linear``: its model with all three rows of each pair. ``consistent``: exact
@@ -51,15 +52,15 @@ def solve(
     Raises
     ------
     FileError
-        If the session has no alignments, none of them can be solved, or its settings cannot be
-        read. Those that cannot be solved are left out.
+        If the folder is not a session, the session has no alignments, none of them can be solved,
+        or its settings cannot be read. Those that cannot be solved are left out.
     ValueError
         If the method is unknown.
 
     Examples
     --------
     >>> import handcal
-    >>> session = handcal.open_session("resources/example_session")
+    >>> session = handcal.example_session()
     >>> results = handcal.solve(session)
     >>> print(results.eyes["left"])
     φ = (+4.20 ± 1.14, -4.39 ± 0.96, +0.91 ± 2.54) mm; rms 1.55 mm, 97 % inliers, converged
@@ -68,6 +69,8 @@ def solve(
     """
     if method is not None and method not in METHODS:
         raise ValueError(f"unknown method {method!r}: choose from {', '.join(METHODS)}")
+    if not isinstance(session, SessionRecord):
+        session = open_session(session)
     settings = stored_solve_settings(session)
     if method is not None:
         settings = replace(settings, method=method)

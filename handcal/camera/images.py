@@ -63,9 +63,8 @@ def read_frame(
     >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
     >>> from handcal.camera.images import write_frame
-    >>> from handcal.sim.camera import simulated_frame
     >>> with TemporaryDirectory() as folder:
-    ...     paths = write_frame(Path(folder), simulated_frame(seed=1))
+    ...     paths = write_frame(Path(folder), handcal.simulated_frame())
     ...     frame = handcal.read_frame(*paths)
     >>> frame.depth.shape, frame.depth.dtype, frame.color.shape
     ((720, 1280), dtype('uint16'), (720, 1280, 3))

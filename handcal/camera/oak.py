@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from handcal.core.errors import CameraError, CameraTimeoutError
+from handcal.core.errors import CameraError, CameraTimeoutError, extra_advice
 from handcal.core.types import CameraIdentity, Frame, Intrinsics
 from handcal.io.closable import Closable
 
@@ -22,7 +22,7 @@ def _library() -> Any:
     try:
         import depthai  # imported late: an extra
     except ImportError as error:
-        raise CameraError("OAK-D cameras need the extra oak: pip install 'handcal[oak]'") from error
+        raise CameraError("OAK-D cameras need depthai", extra_advice("oak")) from error
     return depthai
 
 

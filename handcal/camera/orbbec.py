@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from handcal.core.errors import CameraError, CameraTimeoutError
+from handcal.core.errors import CameraError, CameraTimeoutError, extra_advice
 from handcal.core.geometry import rigid
 from handcal.core.types import CameraIdentity, Float64, Frame, Intrinsics, UInt8
 from handcal.io.closable import Closable
@@ -21,9 +21,7 @@ def _sdk() -> Any:
     try:
         import pyorbbecsdk  # imported late: an extra
     except ImportError as error:
-        raise CameraError(
-            "Orbbec cameras need the extra orbbec: pip install 'handcal[orbbec]'"
-        ) from error
+        raise CameraError("Orbbec cameras need pyorbbecsdk2", extra_advice("orbbec")) from error
     return pyorbbecsdk
 
 

@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 
 from handcal.camera.images import DISTORTION_COUNTS
 from handcal.camera.playback import PlaybackSettings, PlayedCamera
-from handcal.core.errors import CameraEndError, CameraError, FileError
+from handcal.core.errors import CameraEndError, CameraError, FileError, extra_advice
 from handcal.core.geometry import invert, is_rigid, rigid
 from handcal.core.types import CameraIdentity, Float64, Frame, Intrinsics, UInt8, UInt16
 from handcal.io.images import MAX_SIDE_PX, decode_image
@@ -99,9 +99,7 @@ class RosCamera(PlayedCamera):
             from rosbags.highlevel import AnyReader
             from rosbags.typesys import Stores, get_typestore
         except ImportError as error:
-            raise CameraError(
-                "recordings of ROS need rosbags: pip install 'handcal[ros]'"
-            ) from error
+            raise CameraError("recordings of ROS need rosbags", extra_advice("ros")) from error
         self.name = f"Recording {folder.name}"
         self.identity = CameraIdentity()
         self._folder = folder

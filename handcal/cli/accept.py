@@ -60,6 +60,7 @@ _HOW: dict[RigPart, str] = {
     ),
     *BOARD_OPTIONS,
     GRID_OPTION,
+    example="handcal rig accept captures --rig rig.yaml",
     json=True,
 )
 def accept(arguments: argparse.Namespace) -> None:
@@ -110,6 +111,7 @@ def accept(arguments: argparse.Namespace) -> None:
     file_option("--rig", "the true rig (default: the shipped example)"),
     value("--views", number(int, 3, 100), "N", "images of the board for each camera", default=20),
     seed(),
+    example="handcal rig simulate captures --views 8",
 )
 def simulate(arguments: argparse.Namespace) -> None:
     """Render the images of an offline calibration and of an acceptance, to practise with."""

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
 from handcal.cli.output import console, show_progress, table
-from handcal.cli.terminal import arg, flag, number, value
+from handcal.cli.terminal import arg, fail, flag, number, value
 from handcal.core.errors import HandcalError
 from handcal.rig.boards.board import Board, BoardKind
 
@@ -41,7 +41,7 @@ GRID_OPTION = value(
 
 
 def board_of(arguments: argparse.Namespace) -> Board:
-    """Return the board that the options describe; HandcalError if they contradict each other."""
+    """Return the board that the options describe; exit with code 2 if none can be."""
     try:
         return Board(
             kind=arguments.kind,
@@ -52,7 +52,7 @@ def board_of(arguments: argparse.Namespace) -> Board:
             legacy=arguments.legacy,
         )
     except ValueError as error:
-        raise HandcalError(str(error)) from error
+        fail(str(error), 2)
 
 
 def grid_of(arguments: argparse.Namespace, width_px: int, height_px: int) -> Grid:
@@ -66,10 +66,12 @@ def views_of(
     paths: Iterable[Path], board: Board, dropped: Sequence[str] = ()
 ) -> tuple[BoardImage, ...]:
     """Look for a board in images, with progress; leave those out that are dropped."""
-    from handcal.rig.boards.views import drop, image_files, read_views
+    from handcal.rig.boards.views import drop, image_files, read_views, require_names
 
+    files = image_files(paths)
+    require_names(dropped, (file.name for file in files))
     with show_progress() as progress:
-        views = read_views(image_files(paths), board, progress)
+        views = read_views(files, board, progress)
     return drop(views, dropped)
 
 

@@ -64,6 +64,7 @@ GATE = arg(
     seed("the simulated hand and room"),
     GATE,
     *REALSENSE_OPTIONS,
+    example="handcal record hand.db3 --seconds 20",
     json=True,
 )
 def record(arguments: argparse.Namespace) -> None:

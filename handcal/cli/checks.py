@@ -13,7 +13,16 @@ from typing import TYPE_CHECKING, Any
 
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
 from handcal.cli.run import KEYS, LISTEN, paired_headsets
-from handcal.cli.terminal import arg, command, fail, file_option, flag, folder_option, patience
+from handcal.cli.terminal import (
+    arg,
+    command,
+    fail,
+    file_option,
+    flag,
+    folder_option,
+    output_file,
+    patience,
+)
 from handcal.core.errors import HandcalError
 
 if TYPE_CHECKING:
@@ -32,6 +41,7 @@ if TYPE_CHECKING:
         default=30,
         help="with --gui: frames per second of the replayed camera",
     ),
+    example="handcal bench --quick --only offline",
     json=True,
 )
 def bench(arguments: argparse.Namespace) -> None:
@@ -69,6 +79,7 @@ def bench(arguments: argparse.Namespace) -> None:
     patience("until the headset connects", 20.0),
     *LISTEN,
     KEYS,
+    example="handcal doctor --rig rig.yaml",
 )
 def doctor(arguments: argparse.Namespace) -> None:
     """Check the installation, the camera and the headset, with advice for each problem."""
@@ -87,13 +98,14 @@ def doctor(arguments: argparse.Namespace) -> None:
 
 
 @command(
-    file_option("--output", "ZIP file to write", default=Path("handcal-support.zip")),
+    output_file("--output", "ZIP file to write", default="handcal-support.zip"),
     folder_option(
         "--sessions",
         "further folder of sessions whose wearers' names are taken out; may be repeated",
         action="append",
     ),
     arg("--frames", type=Path, metavar="RECORDING", help="recording to add: a file or a folder"),
+    example="handcal support --output report.zip --sessions sessions",
 )
 def support(arguments: argparse.Namespace) -> None:
     """Write one file for a bug report: doctor, versions, log without names, frames if wanted."""

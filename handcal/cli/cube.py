@@ -12,10 +12,12 @@ from handcal.cli.output import console, save, show_progress, table
 from handcal.cli.terminal import (
     arg,
     command,
+    fail,
     file_option,
     flag,
     folder_option,
     number,
+    output_file,
     seed,
     settings_of,
     value,
@@ -55,9 +57,9 @@ _CAPTURES = (
 
 
 @command(
-    file_option("--pdf", "net at true size", required=True),
+    output_file("--pdf", "net at true size", required=True),
     arg("--paper", choices=tuple(PAPERS), default="a4", help="paper size of the PDF"),
-    file_option("--cube", "description of the cube (default: not written)"),
+    output_file("--cube", "description of the cube (default: not written)"),
     value("--side-mm", _SIDE, "MM", "side of the cube", default=1e3 * _USUAL.side_m),
     value("--marker-mm", _SIDE, "MM", "side of a marker", default=1e3 * _USUAL.marker_m),
     arg("--dictionary", default=_USUAL.dictionary, help="ArUco dictionary of the markers"),
@@ -69,6 +71,7 @@ _CAPTURES = (
         default=_USUAL.ids,
         help="markers of the six faces",
     ),
+    example="handcal evaluate cube net --pdf net.pdf --cube cube.json",
 )
 def net(arguments: argparse.Namespace) -> None:
     """Make a cube: its net to print at true size, and the file that describes it."""
@@ -84,7 +87,7 @@ def net(arguments: argparse.Namespace) -> None:
         make_folder(arguments.pdf.parent)
         write_cube_pdf(arguments.pdf, cube, arguments.paper)
     except ValueError as error:
-        raise HandcalError(str(error)) from error
+        fail(str(error), 2)
     console.print(f"{arguments.pdf}: print at 100 %, and measure the ruler")
     if arguments.cube is not None:
         make_folder(arguments.cube.parent)
@@ -123,6 +126,7 @@ def net(arguments: argparse.Namespace) -> None:
         "take each image once the cube or the grid is at rest, without Enter; between two "
         "images of the cube, cover it",
     ),
+    example="handcal evaluate cube capture captures --camera 0 --automatic",
 )
 def capture(arguments: argparse.Namespace) -> None:
     """Capture the real and the drawn cube with a camera, guided step by step."""
@@ -142,7 +146,7 @@ def capture(arguments: argparse.Namespace) -> None:
             arguments.positions, arguments.poses, arguments.drawn, not arguments.no_grid
         )
     except ValueError as error:
-        raise HandcalError(str(error)) from error
+        fail(str(error), 2)
     cube, grid = cube_and_grid(_settings(arguments), arguments.folder)
     if not missing_captures(arguments.folder, plan):
         console.print("All captures have been taken.")
@@ -173,6 +177,7 @@ def capture(arguments: argparse.Namespace) -> None:
         help="prior of the solver: the placement of the camera, or the eye box of wearers",
     ),
     *_RIG_AND_EYE,
+    example="handcal evaluate cube simulate captures --poses 2",
 )
 def simulate(arguments: argparse.Namespace) -> None:
     """Render all captures of a test, with a display calibrated by a simulated hand."""
@@ -191,6 +196,7 @@ def simulate(arguments: argparse.Namespace) -> None:
         "intrinsics of the camera in the eye's place (default: FOLDER/camera.json)",
     ),
     folder_option("--output", "folder for the report", default=Path("results/cube")),
+    example="handcal evaluate cube report captures --output report",
     json=True,
 )
 def report(arguments: argparse.Namespace) -> None:

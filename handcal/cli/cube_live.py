@@ -16,6 +16,7 @@ from handcal.cli.terminal import (
     command,
     eyes_of,
     eyes_option,
+    fail,
     file_option,
     flag,
     number,
@@ -60,6 +61,7 @@ _CUBE = (
     value("--seconds", number(float, 0.1, 86_400.0), "S", "stop after this time", default=30.0),
     *_CUBE,
     *REALSENSE_OPTIONS,
+    example="handcal evaluate cube track --camera simulator --no-headset --seconds 5",
     json=True,
 )
 def track(arguments: argparse.Namespace) -> None:
@@ -108,6 +110,7 @@ def track(arguments: argparse.Namespace) -> None:
     eyes_option("eyes to record trials for"),
     *_CUBE,
     *REALSENSE_OPTIONS,
+    example="handcal evaluate trials sessions/NAME --cube cube.json",
     json=True,
 )
 def trials(arguments: argparse.Namespace) -> None:
@@ -121,7 +124,7 @@ def trials(arguments: argparse.Namespace) -> None:
     )
 
     if (arguments.headset == "virtual") != (arguments.camera == "simulator"):
-        raise HandcalError("--headset virtual and --camera simulator go together")
+        fail("--headset virtual and --camera simulator go together", 2)
     settings = TrialSettings(eyes_of(arguments), patience_s=arguments.patience_s)
     made = record_user_trials(
         TrialOrder(arguments.session, arguments.cube, settings),

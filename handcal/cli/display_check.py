@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING
 
 from handcal.cli.output import console
 from handcal.cli.run import KEYS, LISTEN, paired_headsets
-from handcal.cli.terminal import arg, command, eyes_of, eyes_option, file_option, patience
+from handcal.cli.terminal import (
+    arg,
+    command,
+    eyes_of,
+    eyes_option,
+    file_option,
+    number,
+    output_file,
+    patience,
+    value,
+)
 from handcal.core.errors import HandcalError
 from handcal.io.files import make_folder
 
@@ -25,17 +35,18 @@ _MODES = "obeys", "no-override", "one-for-both", "depth", "infinity", "image-pla
 
 @command(
     file_option("--rig", "rig file of this headset", required=True),
-    file_option("--output", "rig file to write", required=True),
+    output_file("--output", "rig file to write", required=True),
     arg(
         "--headset",
         choices=("network", "virtual"),
         default="network",
         help="a paired headset that connects; or a simulated one in front of a simulated camera",
     ),
-    arg(
+    value(
         "--viewpoint",
-        metavar="SOURCE",
-        help="number of the viewpoint camera (default: ask who looks through the display)",
+        number(int, 0, 99),
+        "N",
+        "number of the viewpoint camera (default: ask who looks through the display)",
     ),
     eyes_option("the eyes to check"),
     arg(
@@ -47,6 +58,7 @@ _MODES = "obeys", "no-override", "one-for-both", "depth", "infinity", "image-pla
     patience("until a headset connects"),
     *LISTEN,
     KEYS,
+    example="handcal rig display-check --rig rig.yaml --output checked.yaml",
 )
 def display_check(arguments: argparse.Namespace) -> None:
     """Check that a connected headset draws what it is sent, and store the check in a rig file."""
@@ -106,20 +118,18 @@ def network_server(arguments: argparse.Namespace) -> Iterator[HeadsetServer]:
 
 
 @contextmanager
-def _observer(viewpoint: str | None) -> Iterator[Observe]:
+def _observer(viewpoint: int | None) -> Iterator[Observe]:
     from handcal.camera.viewpoint import open_viewpoint
     from handcal.station.checks.display_check import by_camera, by_wearer
 
     if viewpoint is None:
         yield by_wearer(_ask)
         return
-    if not viewpoint.isdecimal():
-        raise HandcalError("the viewpoint camera must be a live one: give its number")
 
     def ready(eye: Eye) -> None:
         console.input(f"Put the camera before the {eye} eye's display, then press Enter ")
 
-    with open_viewpoint(int(viewpoint)) as camera:
+    with open_viewpoint(viewpoint) as camera:
         yield by_camera(camera, ready)
 
 

@@ -11,13 +11,14 @@ from handcal.cli.output import console, save, show_progress, table
 from handcal.cli.terminal import (
     arg,
     command,
+    fail,
     file_option,
     folder_option,
     number,
+    output_file,
     settings_of,
     value,
 )
-from handcal.core.errors import HandcalError
 from handcal.hand.settings import Roi
 from handcal.io.files import make_folder, require_suffix
 
@@ -51,8 +52,9 @@ from handcal.io.files import make_folder, require_suffix
         choices=("blue", "black"),
         help="recolour the hands of photographs on a white background",
     ),
-    file_option("--sheet", "PNG with the worst failures"),
+    output_file("--sheet", "PNG with the worst failures"),
     file_option("--model", "ONNX model (default: the shipped one)"),
+    example="handcal evaluate detector photographs --sheet errors.png",
     json=True,
 )
 def detector(arguments: argparse.Namespace) -> None:
@@ -70,7 +72,7 @@ def detector(arguments: argparse.Namespace) -> None:
 
     images = arguments.images or arguments.folder
     if images is None or (arguments.images and arguments.folder):
-        raise HandcalError("no photographs to measure", "give one folder, or --images")
+        fail("no photographs to measure; give one folder, or --images", 2)
     conditions = Conditions(arguments.brightness, arguments.hand_height, arguments.glove)
     if arguments.sheet is not None:  # before the long work, whose result would be lost
         require_suffix(arguments.sheet, ".png")
@@ -114,8 +116,9 @@ def detector(arguments: argparse.Namespace) -> None:
         default="detector",
         help="hand to segment: where the detector sees one, or the nearest object by depth alone",
     ),
-    file_option("--sheet", "PNG with all frames, masks and numbers"),
+    output_file("--sheet", "PNG with all frames, masks and numbers"),
     folder_option("--output", "folder for a report (default: none)"),
+    example="handcal evaluate segmentation frames --sheet masks.png",
     json=True,
 )
 def segmentation(arguments: argparse.Namespace) -> None:
@@ -149,6 +152,7 @@ def segmentation(arguments: argparse.Namespace) -> None:
 @command(
     arg("folder", type=Path, nargs="+", help="session folder, or a folder of sessions"),
     folder_option("--output", "folder for the report", default=Path("results/users")),
+    example="handcal evaluate users sessions --output report",
     json=True,
 )
 def users(arguments: argparse.Namespace) -> None:

@@ -9,6 +9,7 @@ import argparse
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext, redirect_stdout
 from importlib import import_module
 from importlib.abc import InspectLoader
 from importlib.util import find_spec
@@ -16,7 +17,7 @@ from io import TextIOWrapper
 from types import CodeType
 from typing import NamedTuple, cast
 
-from handcal.cli.terminal import Command, Parser, errors_in_one_line, require_writable
+from handcal.cli.terminal import STANDARD_OUTPUT, Command, Parser, errors_in_one_line
 
 
 class Group(NamedTuple):
@@ -120,13 +121,13 @@ def main() -> None:
             stream.reconfigure(errors="replace")
     with errors_in_one_line():
         arguments = parse(sys.argv[1:])
-        if results := getattr(arguments, "json", None):
-            require_writable(results)  # before a long task, not after it
         # Imported late: --help needs nothing of it.
         from handcal.io.configuration import keep_font_list_in_configuration
 
         keep_font_list_in_configuration()
-        arguments.command(arguments)
+        is_piped = getattr(arguments, "json", None) == STANDARD_OUTPUT
+        with redirect_stdout(sys.stderr) if is_piped else nullcontext():
+            arguments.command(arguments)
 
 
 def parse(words: Sequence[str]) -> argparse.Namespace:

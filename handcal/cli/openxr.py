@@ -11,7 +11,7 @@ from handcal.cli.output import console, save, until_interrupted
 from handcal.cli.terminal import arg, command, file_option, flag
 
 
-@command()
+@command(example="handcal openxr install")
 def install(_: argparse.Namespace) -> None:
     """Have every OpenXR program of this user render with the calibration in force."""
     from handcal.export.openxr import OFF, install_layer
@@ -25,7 +25,7 @@ def install(_: argparse.Namespace) -> None:
     )
 
 
-@command()
+@command(example="handcal openxr remove")
 def remove(_: argparse.Namespace) -> None:
     """Remove the layer and end the calibration in force."""
     from handcal.export.openxr import remove_layer
@@ -36,6 +36,7 @@ def remove(_: argparse.Namespace) -> None:
 @command(
     arg("session", type=Path, help="session folder"),
     flag("--keep", "until it is replaced or the rig changes, not for 12 hours of one wearer"),
+    example="handcal openxr use sessions/NAME",
 )
 def use(arguments: argparse.Namespace) -> None:
     """Put a session's final calibration in force for OpenXR programs."""
@@ -47,7 +48,7 @@ def use(arguments: argparse.Namespace) -> None:
         console.print(line)
 
 
-@command(json=True)
+@command(example="handcal openxr status", json=True)
 def status(arguments: argparse.Namespace) -> None:
     """Show whether the layer is installed, whose calibration is in force, and what it last did."""
     from handcal.export.openxr import layer_status
@@ -70,6 +71,7 @@ def status(arguments: argparse.Namespace) -> None:
         "--key-file",
         "pairing key of another computer (default: HANDCAL_PAIRING_KEY, else paired with this one)",
     ),
+    example="handcal openxr client",
 )
 def client(arguments: argparse.Namespace) -> None:
     """Be the headset of a calibration, on any OpenXR headset of this computer."""

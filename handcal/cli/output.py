@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -10,34 +12,40 @@ from pathlib import Path
 from typing import Any
 
 from rich import box
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderResult
 from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
 from rich.table import Table
 
+from handcal.cli.terminal import STANDARD_OUTPUT
 from handcal.core.progress import Progress
 from handcal.io.files import make_folder, write_json
 
 # Names and paths may hold brackets and colons: they are printed as they are.
 console = Console(soft_wrap=True, highlight=False, markup=False, emoji=False)
+_WIDEST = 10_000  # characters
+
+
+class _WholeTable(Table):
+    """A table that rich does not cut to a width: a pipe has none, and terminals wrap lines."""
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        return super().__rich_console__(console, options.update(max_width=_WIDEST))
 
 
 def table(*columns: str) -> Table:
-    """Return an empty table: a first column that wraps, and right-aligned columns of numbers."""
-    made = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    """Return an empty table: a first column of names, and right-aligned columns of numbers."""
+    made = _WholeTable(box=box.SIMPLE_HEAD, pad_edge=False)
     for place, column in enumerate(columns):
-        made.add_column(
-            column,
-            justify="right" if place else "left",
-            no_wrap=place > 0,
-            overflow="ellipsis" if place else "fold",
-        )
+        made.add_column(column, justify="right" if place else "left", no_wrap=True)
     return made
 
 
 def save(path: Path | None, result: dict[str, Any]) -> None:
     """Write a result as JSON, if there is a path; create its folder."""
-    if path is not None:
+    if path == STANDARD_OUTPUT:
+        print(json.dumps(result, indent=2, allow_nan=False), file=sys.__stdout__)
+    elif path is not None:
         make_folder(path.parent)
         write_json(path, result)
 

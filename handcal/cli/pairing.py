@@ -15,6 +15,7 @@ _KEYS = file_option("--keys", "file of the paired headsets (default: that of the
     _KEYS,
     *LISTEN,
     value("--minutes", number(float, 0.01, 10.0), "M", "give up after this time", default=10.0),
+    example="handcal pair",
 )
 def pair(arguments: argparse.Namespace) -> None:
     """Pair a headset: show a QR code and a short code, and wait for the headset."""
@@ -43,6 +44,7 @@ def pair(arguments: argparse.Namespace) -> None:
     _KEYS,
     arg("--rename", nargs=2, metavar=("DEVICE", "NAME"), help="give a headset another name"),
     arg("--revoke", metavar="DEVICE", help="forget a headset; its session ends"),
+    example="handcal devices --rename 3f2a Blue",
 )
 def devices(arguments: argparse.Namespace) -> None:
     """List the paired headsets; rename or revoke one, by its identity."""

@@ -62,6 +62,7 @@ _ROI = arg(
     flag("--real-time", "play at the recorded frame rate, dropping frames"),
     _ROI,
     GATE,
+    example="handcal replay hand.db3 --json hand.json",
     json=True,
 )
 def replay(arguments: argparse.Namespace) -> None:
@@ -110,6 +111,8 @@ def replay(arguments: argparse.Namespace) -> None:
     folder_option("--output", "folder for the results", required=True),
     _ROI,
     GATE,
+    example="handcal segment --color color.png --depth depth.png --intrinsics camera.json "
+    "--output hand",
 )
 def segment(arguments: argparse.Namespace) -> None:
     """Segment the hand in one image pair: cloud, contour, mask and overlay."""

@@ -24,7 +24,16 @@ from handcal.cli.boards import (
 )
 from handcal.cli.cameras import REALSENSE_OPTIONS, realsense_of
 from handcal.cli.output import console, show_progress, until_interrupted
-from handcal.cli.terminal import arg, command, fail, file_option, folder_option, number, value
+from handcal.cli.terminal import (
+    arg,
+    command,
+    fail,
+    file_option,
+    folder_option,
+    number,
+    output_file,
+    value,
+)
 from handcal.core.errors import HandcalError
 from handcal.io.files import make_folder, write_json
 from handcal.rig.boards.printing import PAPERS
@@ -48,7 +57,7 @@ _CALIBRATION_OPTIONS = (
         help="lens model; auto: the one that best fits images not used to solve it",
     ),
     arg("--drop", nargs="+", default=(), metavar="NAME", help="images to leave out"),
-    file_option("--output", "file for the result (default: only print it)"),
+    output_file("--output", "file for the result (default: only print it)"),
     arg(
         "--format",
         choices=CALIBRATION_FORMATS,
@@ -60,10 +69,11 @@ _CALIBRATION_OPTIONS = (
 
 @command(
     *BOARD_OPTIONS,
-    file_option("--pdf", "PDF at true size, with a ruler to check it"),
+    output_file("--pdf", "PDF at true size, with a ruler to check it"),
     arg("--paper", choices=tuple(PAPERS), default="a4", help="paper size of the PDF"),
-    file_option("--png", "PNG for a screen"),
+    output_file("--png", "PNG for a screen"),
     value("--square-px", number(int, 4, 2000), "PX", "side of a square in the PNG", default=100),
+    example="handcal rig board --pdf board.pdf --paper a3",
 )
 def board(arguments: argparse.Namespace) -> None:
     """Make a calibration board: a PDF at true size, or a PNG for a screen."""
@@ -84,8 +94,8 @@ def board(arguments: argparse.Namespace) -> None:
             write_png(arguments.png, image)
             size = f"{image.shape[1]}x{image.shape[0]}"
             console.print(f"{arguments.png}: {size} pixels")
-    except ValueError as error:
-        raise HandcalError(str(error)) from error
+    except ValueError as error:  # of the options: the board does not fit
+        fail(str(error), 2)
 
 
 @command(
@@ -119,6 +129,7 @@ def board(arguments: argparse.Namespace) -> None:
     GRID_OPTION,
     *BOARD_OPTIONS,
     *REALSENSE_OPTIONS,
+    example="handcal rig take realsense --headset 0 --output pairs",
 )
 def take(arguments: argparse.Namespace) -> None:
     """Capture images of a board, or of a display's grid, from a camera, recording or video."""
@@ -161,6 +172,7 @@ def take(arguments: argparse.Namespace) -> None:
 @command(
     arg("images", type=Path, nargs="+", help="images, or folders of images"),
     *_CALIBRATION_OPTIONS,
+    example="handcal rig camera images --output camera.json",
 )
 def camera(arguments: argparse.Namespace) -> None:
     """Calibrate a camera's intrinsics from images of a board."""
@@ -221,21 +233,20 @@ def camera(arguments: argparse.Namespace) -> None:
         "known intrinsics, such as the camera's own (default: solved from the images)",
     ),
     *_CALIBRATION_OPTIONS,
+    example="handcal rig stereo --depth pairs/depth --headset pairs/headset --output stereo.json",
 )
 def stereo(arguments: argparse.Namespace) -> None:
     """Calibrate the depth camera's pose on the headset from image pairs of one board."""
     import numpy as np
 
-    from handcal.rig.boards.views import pair_views
+    from handcal.rig.boards.views import image_files, pair_views
     from handcal.rig.formats import stereo_json, write_pose
     from handcal.rig.steps import calibrate_depth_camera
 
     if arguments.format == "ros":
-        raise HandcalError(
-            "ROS camera_info has no pose between cameras",
-            "use --format opencv or json",
-        )
+        fail("ROS camera_info has no pose between cameras; use --format opencv or json", 2)
     board = board_of(arguments)
+    image_files(arguments.headset)  # an error before the other images are read, not after it
     pairs = pair_views(
         views_of(arguments.depth, board, arguments.drop), views_of(arguments.headset, board)
     )
@@ -262,7 +273,7 @@ def stereo(arguments: argparse.Namespace) -> None:
 
 @command(
     arg("input", type=Path, help="file by OpenCV, ROS, Kalibr, RealSense, Open3D or Azure Kinect"),
-    arg("output", type=Path, help="file to write"),
+    output_file("--output", "file to write", required=True),
     arg("--format", choices=CALIBRATION_FORMATS, required=True, help="format of the output"),
     arg("--camera", metavar="NAME", help="which camera of the file (default: the first)"),
     arg(
@@ -272,6 +283,7 @@ def stereo(arguments: argparse.Namespace) -> None:
         metavar=("WIDTH", "HEIGHT"),
         help="size of the images in pixels, where the file does not say it",
     ),
+    example="handcal rig convert camchain.yaml --format opencv --output camera.yaml",
 )
 def convert(arguments: argparse.Namespace) -> None:
     """Convert intrinsics or a stereo pose between the files of OpenCV, ROS and handcal."""

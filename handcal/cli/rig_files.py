@@ -23,11 +23,13 @@ from handcal.cli.run import KEYS, LISTEN
 from handcal.cli.terminal import (
     arg,
     command,
+    fail,
     file_option,
     flag,
     folder_option,
     number,
     one_of,
+    output_file,
     patience,
     value,
 )
@@ -42,7 +44,7 @@ if TYPE_CHECKING:
 
 RIG_AND_OUTPUT = (
     file_option("--rig", "rig file to start from (default: the shipped example)"),
-    file_option("--output", "rig file to write", required=True),
+    output_file("--output", "rig file to write", required=True),
 )
 
 
@@ -69,6 +71,7 @@ RIG_AND_OUTPUT = (
     file_option("--depth-to-color", "pose from the depth to the colour imager, in the same case"),
     arg("--name", help="name of the rig (default: unchanged)"),
     *RIG_AND_OUTPUT,
+    example="handcal rig make --stereo stereo.json --name Lab --output rig.yaml",
 )
 def make(arguments: argparse.Namespace) -> None:
     """Write the depth camera's pose, from stereo calibration or the factory, into a rig file."""
@@ -76,7 +79,7 @@ def make(arguments: argparse.Namespace) -> None:
     from handcal.rig.steps import identity_in, intrinsics_in, pose_in, with_stereo
 
     if (arguments.stereo is None) == (arguments.factory is None):
-        raise HandcalError("give either --stereo or --factory")
+        fail("give either --stereo or --factory; see handcal rig make --help", 2)
     rig = rig_or_example(arguments.rig)
     if arguments.factory is not None:
         rig = _with_factory_pose(rig, arguments)
@@ -102,7 +105,7 @@ def _with_factory_pose(rig: Rig, arguments: argparse.Namespace) -> Rig:
 
     settings = hololens2_settings(arguments.factory)
     if settings is None or settings.realsense_rig is not None:
-        raise HandcalError(f"--factory: a headset is hololens2:HOST, not {arguments.factory}")
+        fail(f"--factory: a headset is hololens2:HOST, not {arguments.factory}", 2)
     with ExitStack() as stack:
         camera = stack.enter_context(HoloLens2Camera(settings))
         T_H_D = camera.T_H_D
@@ -125,6 +128,7 @@ def _with_factory_pose(rig: Rig, arguments: argparse.Namespace) -> Rig:
     *RIG_AND_OUTPUT,
     *BOARD_OPTIONS,
     *REALSENSE_OPTIONS,
+    example="handcal rig depth realsense --rig rig.yaml --output checked.yaml",
 )
 def depth(arguments: argparse.Namespace) -> None:
     """Check depth and edges of the depth camera by a board, and store them in a rig file."""
@@ -173,7 +177,7 @@ def depth(arguments: argparse.Namespace) -> None:
     write_rig_file(arguments.output, replace(rig, depth_check=measured))
 
 
-@command(arg("input", type=Path, help="rig file"), json=True)
+@command(arg("input", type=Path, help="rig file"), example="handcal rig check rig.yaml", json=True)
 def check(arguments: argparse.Namespace) -> None:
     """Check a rig file: every field, its plausibility, and how it was calibrated."""
     from handcal.rig.findings import report_rig
@@ -196,6 +200,7 @@ def check(arguments: argparse.Namespace) -> None:
 @command(
     arg("a", type=Path, help="rig file"),
     arg("b", type=Path, help="another rig file"),
+    example="handcal rig compare rig.yaml former.yaml",
     json=True,
 )
 def compare(arguments: argparse.Namespace) -> None:
@@ -254,8 +259,9 @@ _DISPLAY = arg(
 
 @command(
     _DISPLAY,
-    file_option("--png", "image to write", required=True),
+    output_file("--png", "image to write", required=True),
     GRID_OPTION,
+    example="handcal rig grid --display 1268 720 --png grid.png",
 )
 def grid(arguments: argparse.Namespace) -> None:
     """Make the grid that a display shows to the viewpoint camera, pixel for pixel."""
@@ -274,6 +280,7 @@ def grid(arguments: argparse.Namespace) -> None:
 @command(
     _DISPLAY,
     folder_option("--output", "folder for the patterns", required=True),
+    example="handcal rig gray --display 1268 720 --output patterns",
 )
 def gray(arguments: argparse.Namespace) -> None:
     """Make the Gray-code patterns that a display shows one after the other, in place of a grid."""
@@ -338,6 +345,8 @@ def gray(arguments: argparse.Namespace) -> None:
     GRID_OPTION,
     *BOARD_OPTIONS,
     *RIG_AND_OUTPUT,
+    example="handcal rig display grid --eye left --camera-intrinsics camera.json --stereo "
+    "viewpoint.json --distance-m 2 --rig rig.yaml --output rig-left.yaml",
 )
 def display(arguments: argparse.Namespace) -> None:
     """Calibrate one eye's display from the viewpoint camera's images of its grid."""
@@ -366,7 +375,7 @@ def display(arguments: argparse.Namespace) -> None:
     size = rig.eyes[eye].width_px, rig.eyes[eye].height_px
     if arguments.gray_code:
         if len(arguments.images) != 1:
-            raise HandcalError("--gray-code takes one folder with the images of all patterns")
+            fail("--gray-code takes one folder with the images of all patterns", 2)
         seen = read_gray_code(arguments.images[0], *size)
         result = calibrate_by_gray_code(rig, eye, seen, camera, viewpoint, inputs)
         flat, bent = flatness_arcmin(seen, camera, *size)

@@ -115,6 +115,8 @@ _SHARE = number(float, 0.0, 1.0)
     flag("--lsl", "send the events to the Lab Streaming Layer"),
     GATE,
     *REALSENSE_OPTIONS,
+    example="handcal run --headset network --camera realsense --rig rig.yaml --wearer P7 --plan "
+    "recommended",
     json=True,
 )
 def run(arguments: argparse.Namespace) -> None:

@@ -10,7 +10,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from handcal.cli.output import console, save, show_progress, table, triple
-from handcal.cli.terminal import arg, command, fail, file_option, folder_option, number, value
+from handcal.cli.terminal import (
+    arg,
+    command,
+    fail,
+    file_option,
+    folder_option,
+    number,
+    output_file,
+    value,
+)
 from handcal.core.types import METHODS
 from handcal.export.formats import FORMATS, TOOL_FORMATS
 from handcal.session.record import SessionRecord
@@ -37,6 +46,7 @@ _METRES = number(float, 1e-3, 1e6)
         "its standard deviation",
         default=1.0,
     ),
+    example="handcal solve sessions/NAME --method paper --json -",
     json=True,
 )
 def solve(arguments: argparse.Namespace) -> None:
@@ -98,6 +108,7 @@ def solve(arguments: argparse.Namespace) -> None:
     file_option(
         "--into", "North Star configuration to write northstar into; its trackers stay in it"
     ),
+    example="handcal export sessions/NAME --format report --format csv --output report",
 )
 def export(arguments: argparse.Namespace) -> None:
     """Export sessions: report, tables, calibration, clouds, and the session as one file."""
@@ -140,7 +151,11 @@ def export(arguments: argparse.Namespace) -> None:
         console.print(f"{arguments.into}, as it was in {kept}")
 
 
-@command(arg("session", type=Path, help="session folder"), json=True)
+@command(
+    arg("session", type=Path, help="session folder"),
+    example="handcal session check sessions/NAME",
+    json=True,
+)
 def check(arguments: argparse.Namespace) -> None:
     """Check all of a session, and solve it; exit code 1 if any is bad, 2 if it is none."""
     from handcal.calibration.solve_again import check_solvable
@@ -161,6 +176,7 @@ def check(arguments: argparse.Namespace) -> None:
     arg("session", type=Path, help="session folder; it is not changed"),
     folder_option("--output", "new folder for the copy", required=True),
     file_option("--rig", "rig file, if the session's own is damaged"),
+    example="handcal session repair sessions/NAME --output sessions/repaired",
 )
 def repair(arguments: argparse.Namespace) -> None:
     """Copy the sound parts of a damaged session into a new one."""
@@ -184,7 +200,8 @@ def _say_what_is_left_out(record: SessionRecord) -> None:
     value(
         "--alignment", number(int, 1, 1000), "N", "the alignment shown first (default: the last)"
     ),
-    file_option("--picture", "write a .png file instead of opening a window; needs no display"),
+    output_file("--picture", "write a .png file instead of opening a window; needs no display"),
+    example="handcal inspect sessions/NAME --picture view.png",
 )
 def inspect(arguments: argparse.Namespace) -> None:
     """Show a session's clouds, residuals, eyes and displays in a 3D window."""
@@ -194,11 +211,14 @@ def inspect(arguments: argparse.Namespace) -> None:
 
     outcome = load_outcome(Session.open(arguments.session))
     inspect_session(outcome, arguments.alignment, arguments.picture)
+    if arguments.picture:
+        console.print(str(arguments.picture))
 
 
 @command(
     arg("folder", type=Path, help="folder of sessions"),
     file_option("--rig", "rig file (default: the shipped example)"),
+    example="handcal prior sessions --rig rig.yaml",
     json=True,
 )
 def prior(arguments: argparse.Namespace) -> None:

@@ -108,6 +108,7 @@ _LINK = (
         help="the wearer's eye distance, measured with 1 mm of error: by a ruler and typed, or by "
         "the headset",
     ),
+    example="handcal demo --plan recommended --seed 7",
     json=True,
 )
 def demo(arguments: argparse.Namespace) -> None:
@@ -115,6 +116,8 @@ def demo(arguments: argparse.Namespace) -> None:
     from handcal.core.types import EyeDistance
     from handcal.lab.demo import DemoSettings, run_demo
 
+    if arguments.slipped and arguments.former is None:
+        fail("--slipped needs --from SESSION", 2)
     settings = settings_of(DemoSettings, arguments)
     with until_interrupted() as is_stopped, show_progress(is_stopped) as progress:
         rig = _rig_path(arguments.rig)
@@ -273,6 +276,7 @@ def _next_step(verdict: VerdictName, settings: DemoSettings, session: str) -> st
     ),
     _HAND,
     flag("--as-device", "no simulated wearer: print what is shown, confirm on Enter"),
+    example="handcal headset --pair --host 192.168.1.20 --port 47800",
 )
 def headset(arguments: argparse.Namespace) -> None:
     """Run a virtual headset with a simulated wearer, connected by the real protocol."""

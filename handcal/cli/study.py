@@ -15,6 +15,7 @@ from handcal.cli.terminal import (
     Option,
     arg,
     command,
+    fail,
     flag,
     folder_option,
     number,
@@ -66,8 +67,9 @@ def _study_options(name: str) -> tuple[Option, ...]:
 
 
 @command(
-    flag("--open3d", "solve by Open3D's ICP too (pip install handcal[3d])"),
+    flag("--open3d", "solve by Open3D's ICP too, if it is installed"),
     *_study_options("noise"),
+    example="handcal study noise --quick",
     json=True,
 )
 def noise(arguments: argparse.Namespace) -> None:
@@ -94,6 +96,7 @@ def noise(arguments: argparse.Namespace) -> None:
         dest="noise_wearers",
     ),
     *_study_options("methods"),
+    example="handcal study methods --quick",
     json=True,
 )
 def methods(arguments: argparse.Namespace) -> None:
@@ -176,18 +179,24 @@ def methods(arguments: argparse.Namespace) -> None:
         "--output",
         "folder for this study only; an unfinished study is resumed (default: none is kept)",
     ),
+    example="handcal study procedures --wearers 10 --plan recommended spaam-20",
     json=True,
 )
 def procedures(arguments: argparse.Namespace) -> None:
     """Compare calibration procedures on the same simulated wearers."""
     from handcal.lab.settings import ProcedureStudySettings
+    from handcal.lab.study.procedures import require_known
     from handcal.lab.study.studies import run_procedure_study
 
     settings = settings_of(ProcedureStudySettings, arguments)
+    try:
+        require_known(settings)
+    except ValueError as error:
+        fail(str(error), 2)
     rows = _unless_interrupted(partial(run_procedure_study, settings))
     save(arguments.json, {"rows": [asdict(row) for row in rows]})
     shown = table(
-        "", "before", "after", "95 %", "time", "worse", "accepted", "both", "depth", "worse"
+        "plan", "before", "after", "95 %", "time", "worse", "accepted", "both", "depth", "worse"
     )
     for row in rows:
         shown.add_row(
@@ -211,6 +220,7 @@ def _percent(share: float | None) -> str:
 
 @command(
     arg("folder", type=Path, help="folder 'dataset' of github.com/YutaItoh/HMD-Calibration"),
+    example="handcal study recorded HMD-Calibration/dataset",
     json=True,
 )
 def recorded(arguments: argparse.Namespace) -> None:

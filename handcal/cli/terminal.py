@@ -33,20 +33,24 @@ class Command(NamedTuple):
 
     run: Run
     options: tuple[Option, ...]
+    example: str
+    """A command line for the help."""
 
     def add_to(self, parser: Parser) -> None:
         """Add the options to the command's parser."""
         parser.formatter_class = _Help
+        parser.epilog = f"example:\n  {self.example}"
         for add in self.options:
             add(parser)
         parser.set_defaults(command=self.run)
 
 
-def command(*options: Option, json: bool = False) -> Callable[[Run], Command]:
+def command(*options: Option, example: str, json: bool = False) -> Callable[[Run], Command]:
     """Make a function a command with these options; with `json`, also ``--json``."""
     if json:
-        options = (*options, file_option("--json", "also write the results as JSON"))
-    return lambda run: Command(run, options)
+        purpose = "also write the results as JSON; -: to standard output, and all else to stderr"
+        options = (*options, value("--json", _json_file, "FILE", purpose))
+    return lambda run: Command(run, options, example)
 
 
 def arg(*names: str, **settings: Any) -> Option:
@@ -57,6 +61,14 @@ def arg(*names: str, **settings: Any) -> Option:
 def file_option(name: str, purpose: str, **settings: Any) -> Option:
     """Return an option that takes a file; the settings are those of `arg`."""
     return arg(name, type=Path, metavar="FILE", help=purpose, **settings)
+
+
+def output_file(name: str, purpose: str, **settings: Any) -> Option:
+    """Return an option that takes a file to write; the settings are those of `arg`.
+
+    A file that cannot be written ends the program before the work, not after it.
+    """
+    return arg(name, type=_writable, metavar="FILE", help=purpose, **settings)
 
 
 def folder_option(name: str, purpose: str, **settings: Any) -> Option:
@@ -108,7 +120,10 @@ class Parser(argparse.ArgumentParser):
 
 
 class _Help(argparse.HelpFormatter):
-    """Shows the default of every option that has one."""
+    """Shows the default of every option that has one, and an example in one line, to be copied."""
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        return text if text.startswith("example:") else super()._fill_text(text, width, indent)
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
         default = action.default
@@ -142,12 +157,29 @@ def fail(message: str, code: int) -> NoReturn:
     sys.exit(code)
 
 
-def require_writable(path: Path) -> None:
-    """Exit with code 1 if a file cannot be written, as far as that can be known before."""
-    folder = next((one for one in path.absolute().parents if one.exists()), path)
-    if path.is_dir() or not (folder.is_dir() and os.access(folder, os.W_OK)):
-        why = "is a folder" if path.is_dir() else f"{folder} is not a folder that can be written to"
+STANDARD_OUTPUT = Path("-")
+"""Names standard output as the file of ``--json``."""
+
+
+def _json_file(text: str) -> Path:
+    return STANDARD_OUTPUT if text in ("-", "/dev/stdout") else _writable(text)
+
+
+def _writable(text: str) -> Path:
+    """Return the path of a file to write; exit with code 1 if it cannot be written."""
+    from tempfile import TemporaryFile  # slow to import, and not needed for --help
+
+    path = Path(text)
+    if path.exists() and not path.is_file():
+        fail(f"cannot write {path}: it is a folder, a device or a pipe; choose another file", 1)
+    folder = next(one for one in path.absolute().parents if one.exists())
+    try:
+        with TemporaryFile(dir=folder) as file:
+            file.write(b" ")  # a full disk takes an empty file
+    except OSError as error:
+        why = f"nothing can be written in {folder} ({error.strerror or error})"
         fail(f"cannot write {path}: {why}; choose another file", 1)
+    return path
 
 
 @contextmanager

@@ -36,12 +36,18 @@ _SLICER_FROM_OPENCV = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
-    """A pose as OpenXR's XrPosef and Unity's Pose hold it."""
+    """A pose as OpenXR's XrPosef and Unity's Pose hold it.
+
+    Attributes
+    ----------
+    position_m
+        (3,); its origin.
+    quaternion_xyzw
+        (4,); unit length, w not negative.
+    """
 
     position_m: Float64
-    """(3,)."""
     quaternion_xyzw: Float64
-    """(4,); unit length, w not negative."""
 
     def __post_init__(self) -> None:
         freeze(self, "position_m", np.float64, 3)
@@ -52,7 +58,13 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class Fov:
-    """OpenXR's XrFovf: angles from the forward axis; left and down are usually negative."""
+    """OpenXR's XrFovf: angles from the forward axis; left and down are usually negative.
+
+    Attributes
+    ----------
+    left_rad, right_rad, up_rad, down_rad
+        Of the four edges of the image.
+    """
 
     left_rad: float
     right_rad: float
@@ -62,13 +74,19 @@ class Fov:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EyeCamera:
-    """One eye as a camera of OpenGL or Unity; column vectors, clip space's z from -1 to +1."""
+    """One eye as a camera of OpenGL or Unity; column vectors, clip space's z from -1 to +1.
+
+    Attributes
+    ----------
+    projection
+        (4, 4); clip space from V for OpenGL, from the eye for Unity, in OpenGL's axes of V. Its
+        frustum is not symmetric.
+    view_from_head
+        (4, 4); V or the eye from the headset rig H, in the axes of the system.
+    """
 
     projection: Float64
-    """(4, 4); clip space from V for OpenGL, from the eye for Unity, in OpenGL's axes of V. Its
-    frustum is not symmetric."""
     view_from_head: Float64
-    """(4, 4); V or the eye from the headset rig H, in the axes of the system."""
 
     def __post_init__(self) -> None:
         freeze(self, "projection", np.float64, 4, 4)
@@ -106,7 +124,7 @@ def to_unity(
     Examples
     --------
     >>> import handcal
-    >>> session = handcal.open_session("resources/example_session")
+    >>> session = handcal.example_session()
     >>> unity = handcal.to_unity(session.rig, handcal.solve(session), near_m=0.2, far_m=20.0)
     >>> unity["right"].projection.shape, unity["right"].view_from_head.shape
     ((4, 4), (4, 4))
@@ -129,7 +147,7 @@ def to_opengl(
     Examples
     --------
     >>> import handcal
-    >>> session = handcal.open_session("resources/example_session")
+    >>> session = handcal.example_session()
     >>> left = handcal.to_opengl(session.rig, handcal.solve(session))["left"]
     >>> clip = left.projection @ left.view_from_head @ [0.0, 0.0, -0.6, 1.0]
     >>> (clip[:3] / clip[3]).round(2)  # normalised device coordinates of a point in H
@@ -166,7 +184,7 @@ def to_openxr(rig: Rig, results: Solved) -> dict[Eye, tuple[Pose, Fov]]:
     Examples
     --------
     >>> import handcal
-    >>> session = handcal.open_session("resources/example_session")
+    >>> session = handcal.example_session()
     >>> pose, fov = handcal.to_openxr(session.rig, handcal.solve(session))["left"]
     >>> (1e3 * pose.position_m).round(2)  # mm: the eye in V
     array([4.7 , 3.39, 1.09])
@@ -180,14 +198,6 @@ def opengl_transform(T: Float64) -> Float64:
     ``F T F`` with F = diag(1, -1, -1, 1): for poses, view matrices (``T_V_W``) and UQ.
     """
     return _OPENGL_FROM_OPENCV @ T @ _OPENGL_FROM_OPENCV
-
-
-def unity_transform(T: Float64) -> Float64:
-    """Convert a (4, 4) transform between OpenCV's axes and Unity's left-handed ones, either way.
-
-    ``G T G`` with G = diag(1, -1, 1, 1), which is ``S (F T F) S`` with S = diag(1, 1, -1, 1).
-    """
-    return _UNITY_FROM_OPENCV @ T @ _UNITY_FROM_OPENCV
 
 
 def unity_world_to_camera(T_V_W: Float64) -> Float64:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handcal.core.frozen import readonly
+from handcal.core.frozen import readonly, require_kind
 from handcal.core.geometry import invert, project, rigid, transform
 from handcal.core.types import EYES, Bool, Eye, EyeDisplay, Float64, Rig, Solved
 
@@ -137,11 +137,13 @@ def projections(rig: Rig, results: Solved) -> dict[Eye, Float64]:
     ------
     ValueError
         If an eye would lie on or beyond its display's focal plane.
+    TypeError
+        If `rig` is no `Rig`.
 
     Examples
     --------
     >>> import handcal
-    >>> session = handcal.open_session("resources/example_session")
+    >>> session = handcal.example_session()
     >>> P = handcal.projections(session.rig, handcal.solve(session))
     >>> P["left"].shape
     (3, 4)
@@ -149,6 +151,7 @@ def projections(rig: Rig, results: Solved) -> dict[Eye, Float64]:
     >>> print(f"{u / depth:.0f} {v / depth:.0f} px")
     614 369 px
     """
+    require_kind("rig", rig, Rig)
     solved = results.eyes
     return {
         eye: projection_matrix(display, solved[eye].shift_m)
@@ -180,24 +183,6 @@ def target_corners_m(depth_m: float) -> Float64:
     x = half_m * np.array([-1.0, 1.0, 1.0, -1.0])
     y = half_m * np.array([-1.0, -1.0, 1.0, 1.0])
     return np.column_stack([x, y, np.full(4, depth_m)])
-
-
-def reprojection_error_px(
-    display: EyeDisplay, shift_m: ArrayLike, true_shift_m: ArrayLike, points_E_m: Float64
-) -> Float64:
-    """Return the (N,) distances on the display between drawn points and their true places.
-
-    Parameters
-    ----------
-    display : EyeDisplay
-    shift_m, true_shift_m : (3,) array_like
-        The shift rendered with, and the true one.
-    points_E_m : (N, 3) float64
-        Points in E.
-    """
-    drawn = project(eye_projection(display, shift_m), points_E_m)
-    needed = project(eye_projection(display, true_shift_m), points_E_m)
-    return np.asarray(np.linalg.norm(drawn - needed, axis=1))
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,7 @@
 """User-facing errors: one line that says what is wrong and how to fix it."""
 
+import sys
+
 
 class HandcalError(Exception):
     """Base class of all user-facing errors.
@@ -71,3 +73,12 @@ class PosePendingError(PoseError):
 
 class CancelledError(HandcalError):
     """A long task was cancelled on request; nothing has changed."""
+
+
+def extra_advice(extra: str) -> str:
+    """Return the advice to install an extra, which depends on how handcal was installed."""
+    if not getattr(sys, "frozen", False):
+        return f"pip install 'handcal[{extra}]'"
+    if extra == "3d":
+        return "install the package handcal-open3d in place of handcal"
+    return "it is not in the Debian package: install handcal's wheel (docs/platforms.md)"

@@ -52,6 +52,12 @@ def freeze(instance: object, name: str, dtype: DTypeLike, *shape: int | None) ->
             raise ValueError(f"{type(instance).__name__}.{name}: {error}") from None
 
 
+def require_kind(name: str, value: object, kind: type) -> None:
+    """Raise TypeError, which names the argument, if a value is not of a kind."""
+    if not isinstance(value, kind):
+        raise TypeError(f"{name} must be of type {kind.__name__}, not {type(value).__name__}")
+
+
 def brief(instance: Any) -> str:
     """Return a dataclass as one line, large arrays by type and shape: a ``__repr__``."""
     values = ", ".join(

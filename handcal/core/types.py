@@ -44,7 +44,19 @@ EYE_DISTANCES_M = 0.045, 0.085
 
 @dataclass(frozen=True, slots=True)
 class Intrinsics:
-    """A pinhole camera in pixels, with OpenCV's distortion coefficients (empty: none)."""
+    """A pinhole camera in pixels, with OpenCV's distortion.
+
+    Attributes
+    ----------
+    width, height
+        Size of the image, px.
+    fx, fy
+        Focal lengths, px.
+    cx, cy
+        Principal point, px; the centres of pixels are at whole numbers.
+    distortion
+        OpenCV's coefficients; empty if there is none.
+    """
 
     width: int
     height: int
@@ -111,6 +123,15 @@ class HeadsetIdentity:
 class EyeDistance:
     """A measured distance between the wearer's pupils.
 
+    Attributes
+    ----------
+    value_m
+        Distance between the pupils.
+    sigma_m
+        Standard deviation: 1 mm for a ruler or a pupillometer.
+    source
+        ``typed`` by the operator, or measured by the ``headset``.
+
     Raises
     ------
     ValueError
@@ -119,7 +140,6 @@ class EyeDistance:
 
     value_m: float
     sigma_m: float = 0.001
-    """Standard deviation: 1 mm for a ruler or a pupillometer."""
     source: Literal["typed", "headset"] = "typed"
 
     def __post_init__(self) -> None:
@@ -138,26 +158,43 @@ class EyeDistance:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """One depth image and, if the camera has one, its colour image."""
+    """One depth image and, if the camera has one, its colour image.
+
+    Attributes
+    ----------
+    index
+        Running number from the camera; a gap means dropped frames.
+    t_camera_ns
+        Exposure time on the camera's clock.
+    t_host_ns
+        Time of arrival on the host's monotonic clock.
+    depth
+        (H, W); 0 where there is no measurement.
+    depth_scale_m
+        Metres per unit of `depth`.
+    depth_intrinsics
+        Of the depth camera.
+    color
+        (h, w, 3); RGB.
+    color_intrinsics
+        Of the colour camera; None without colour.
+    T_C_D
+        (4, 4); from the depth camera to the colour camera; identity for depth aligned to colour.
+    T_W_D
+        (4, 4); the camera's pose at the exposure, if it is the headset's own and reports it; None:
+        follows from the headset's pose, which the app sends over the link.
+    """
 
     index: int
-    """Running number from the camera; a gap means dropped frames."""
     t_camera_ns: int
     t_host_ns: int
-    """Exposure time on the camera's clock, and time of arrival on the host's monotonic clock."""
     depth: UInt16
-    """(H, W); 0 where there is no measurement."""
     depth_scale_m: float
-    """Metres per unit of `depth`."""
     depth_intrinsics: Intrinsics
     color: UInt8 | None = None
-    """(h, w, 3); RGB."""
     color_intrinsics: Intrinsics | None = None
     T_C_D: Float64 = field(default_factory=lambda: np.eye(4))
-    """(4, 4); from the depth camera to the colour camera; identity for depth aligned to colour."""
     T_W_D: Float64 | None = None
-    """(4, 4); the camera's pose at the exposure, if it is the headset's own and reports it; None:
-    follows from the headset's pose, which the app sends over the link."""
 
     __repr__ = brief
 
@@ -180,35 +217,54 @@ every side."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandCloud:
-    """The segmented hand of one frame."""
+    """The segmented hand of one frame.
+
+    Attributes
+    ----------
+    t_camera_ns
+        Exposure time of the frame, on the camera's clock.
+    t_host_ns
+        Time of the frame's arrival, on the host's monotonic clock.
+    points_m
+        (N, 3); visible surface, frame D.
+    is_cut
+        (N,); True beside a cut: a forearm limit, or an edge of the ROI, the image or the depth
+        gate, beyond which the hand continues.
+    colors
+        (N, 3); RGB of the points.
+    contour_m
+        (M, 3); outer contour in order around the hand, frame D.
+    contour_is_cut
+        (M,); True on a cut edge, False on the silhouette. Of the mask, and so of all that the depth
+        camera measured: it may lie outside the hand (see `DepthEdges`).
+    mask
+        (H, W); 255 on the hand, in the depth image; 0 elsewhere.
+    box_px
+        (4,); x0, y0, x1, y1 of the mask in the depth image, x1 and y1 exclusive.
+    median_depth_m
+        Median distance of the hand along the depth camera's axis.
+    outline_m
+        (K, 3); the hand's silhouette as it is drawn, in order around the hand, frame D: the contour
+        itself if not given.
+    outline_is_cut
+        (K,); as `contour_is_cut`.
+    outline_sigma_px
+        Standard deviation of the whole outline inwards or outwards, in pixels of the depth image.
+    """
 
     t_camera_ns: int
     t_host_ns: int
-    """Times of the frame it came from."""
     points_m: Float32
-    """(N, 3); visible surface, frame D."""
     is_cut: Bool
-    """(N,); True beside a cut: a forearm limit, or an edge of the ROI, the image or the depth gate,
-    beyond which the hand continues."""
     colors: UInt8 | None
-    """(N, 3); RGB of the points."""
     contour_m: Float32
-    """(M, 3); outer contour in order around the hand, frame D."""
     contour_is_cut: Bool
-    """(M,); True on a cut edge, False on the silhouette. Of the mask, and so of all that the depth
-    camera measured: it may lie outside the hand (see `DepthEdges`)."""
     mask: UInt8
-    """(H, W); 255 on the hand, in the depth image; 0 elsewhere."""
     box_px: tuple[int, int, int, int]
-    """(4,); x0, y0, x1, y1 of the mask in the depth image, x1 and y1 exclusive."""
     median_depth_m: float
     outline_m: Float32 = field(default_factory=lambda: np.empty((0, 3), np.float32))
-    """(K, 3); the hand's silhouette as it is drawn, in order around the hand, frame D: the contour
-    itself if not given."""
     outline_is_cut: Bool = field(default_factory=lambda: np.empty(0, np.bool_))
-    """(K,); as `contour_is_cut`."""
     outline_sigma_px: float = UNKNOWN_OUTLINE_PX
-    """Standard deviation of the whole outline inwards or outwards, in pixels of the depth image."""
 
     __repr__ = brief
 
@@ -228,32 +284,51 @@ class HandCloud:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Alignment:
-    """One confirmed alignment: the input of the solver."""
+    """One confirmed alignment: the input of the solver.
+
+    Attributes
+    ----------
+    cursor_m
+        (N, 3); the hand at t_a, which was the cursor, frame W.
+    hand_m
+        (N, 3); the hand at t_b, frame W.
+    cursor_is_cut
+        (N,); points of the cursor beside a cut edge.
+    hand_is_cut
+        (N,); points of the hand beside a cut edge.
+    T_E_W
+        each (4, 4); world to each eye's E at t_b.
+    eyes
+        Eyes that were open during the alignment: both, or one.
+    rotation_rad
+        (3,); rotation vector from the cursor to the hand at t_b, measured by the guard, frame D.
+    t_a_ns
+        Camera time of the cursor's frame.
+    t_b_ns
+        Camera time of the confirmed frame.
+    drawn_shift_m
+        each (3,); φ with which the cursor was drawn at t_b; zero for the offline calibration.
+    time_sigma_m
+        Standard deviation of the hand's place because the times of frames and confirmation are not
+        exact.
+    outline_sigma_px
+        `HandCloud.outline_sigma_px` of the cursor as drawn; None: as the rig's `DepthEdges` say.
+    """
 
     cursor_m: Float64
     hand_m: Float64
-    """(N, 3); the hand at t_a and at t_b, frame W."""
     cursor_is_cut: Bool
     hand_is_cut: Bool
-    """(N,); points beside a cut edge."""
     T_E_W: Mapping[Eye, Float64]
-    """each (4, 4); world to each eye's E at t_b."""
     eyes: tuple[Eye, ...]
-    """Eyes that were open during the alignment: both, or one."""
     rotation_rad: Float64
-    """(3,); rotation vector from the cursor to the hand at t_b, measured by the guard, frame D."""
     t_a_ns: int
     t_b_ns: int
-    """Camera times of the two frames."""
     drawn_shift_m: Mapping[Eye, Float64] = field(
         default_factory=lambda: {eye: np.zeros(3) for eye in EYES}
     )
-    """each (3,); φ with which the cursor was drawn at t_b; zero for the offline calibration."""
     time_sigma_m: float = 0.0
-    """Standard deviation of the hand's place because the times of frames and confirmation are not
-    exact."""
     outline_sigma_px: float | None = None
-    """`HandCloud.outline_sigma_px` of the cursor as drawn; None: as the rig's `DepthEdges` say."""
 
     __repr__ = brief
 
@@ -277,26 +352,44 @@ class Alignment:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EyeShift:
-    """A solved eye shift φ from C0 to C1, in E's axes, with its uncertainty and residuals."""
+    """A solved eye shift φ from C0 to C1, in E's axes, with its uncertainty and residuals.
+
+    Attributes
+    ----------
+    shift_m
+        (3,); φ1, φ2, φ3.
+    covariance_m2
+        (3, 3); covariance of φ.
+    rms_m
+        Root mean square distance of the inlier pairs after registration.
+    residuals_m
+        (M,); distance of each hand point to its partner after registration; NaN for an outlier.
+    inlier_ratio
+        Number of inlier pairs over number of hand points.
+    iterations
+        Number of iterations; of fused alignments, of all together.
+    converged
+        True if the last step was small enough, False at the limit of iterations; of fused
+        alignments, True if all converged.
+    stop_reason
+        Why the iterations ended.
+    history_m2
+        (iterations,); mean squared pair distance at each iteration. ``consistent`` measures it
+        along normals and outlines, or, where it fits φ to pairs of the same points, in full.
+    method
+        One of `METHODS`, or ``"fused"``.
+    """
 
     shift_m: Float64
-    """(3,); φ1, φ2, φ3."""
     covariance_m2: Float64
-    """(3, 3)."""
     rms_m: float
-    """Root mean square distance of the inlier pairs after registration."""
     residuals_m: Float64
-    """(M,); distance of each hand point to its partner after registration; NaN for an outlier."""
     inlier_ratio: float
-    """Number of inlier pairs over number of hand points."""
     iterations: int
     converged: bool
     stop_reason: str
     history_m2: Float64
-    """(iterations,); mean squared pair distance at each iteration. ``consistent`` measures it along
-    normals and outlines, or, where it fits φ to pairs of the same points, in full."""
     method: str
-    """One of `METHODS`, or ``"fused"``."""
 
     def __post_init__(self) -> None:
         freeze(self, "shift_m", np.float64, 3)
@@ -570,23 +663,42 @@ class DisplayCheck:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
-    """The offline calibration: both eye displays and the pose of the depth camera."""
+    """The offline calibration: both eye displays and the pose of the depth camera.
+
+    Attributes
+    ----------
+    name
+        Name of the rig, for its users.
+    eyes
+        The display of each eye.
+    T_H_D
+        (4, 4); from the depth camera to the headset rig.
+    depth_intrinsics
+        Of the depth camera.
+    origins
+        Origin of each of `RIG_PARTS`, where it is known.
+    depth_camera
+        The device; empty texts if unknown.
+    headset
+        The device; None if unknown.
+    depth_check
+        The check of the camera's depth; None if there was none.
+    depth_edges
+        Measured with this depth camera; None if they never were.
+    display_check
+        The check that the headset draws what it is sent; None if there was none.
+    """
 
     name: str
     eyes: Mapping[Eye, EyeDisplay]
     T_H_D: Float64
-    """(4, 4); from the depth camera to the headset rig."""
     depth_intrinsics: Intrinsics
     origins: Mapping[RigPart, Origin] = field(default_factory=dict)
-    """Origin of each of `RIG_PARTS`, where it is known."""
     depth_camera: CameraIdentity = CameraIdentity()
     headset: HeadsetIdentity | None = None
     depth_check: DepthCheck | None = None
-    """The devices of the rig and the check of its depth; empty or None if unknown."""
     depth_edges: DepthEdges | None = None
-    """Measured with this depth camera; None if they never were."""
     display_check: DisplayCheck | None = None
-    """The check that the headset draws what it is sent; None if there was none."""
 
     __repr__ = brief
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from handcal.core.errors import FileError, HandcalError
+from handcal.core.errors import FileError, HandcalError, extra_advice
 from handcal.core.progress import Progress
 from handcal.core.types import Bool, Float64
 from handcal.export.outcome import SessionOutcome
@@ -34,10 +34,12 @@ def write_clouds(folder: Path, outcome: SessionOutcome, progress: Progress = Pro
 
     Points are doubles in W, in metres; `is_cut` is 1 at a cut edge. The hand's
     `residual_left_m` and `residual_right_m`, where solved, are each point's distance to its
-    partner on the cursor, NaN for an outlier.
+    partner on the cursor, NaN for an outlier. A comment says what was simulated.
     """
     make_folder(folder)
     solved = outcome.results.alignments if outcome.results else {}
+    simulated = outcome.record.simulated
+    comments = [f"simulated: {simulated}"] if simulated else []
     for done, (number, shifts) in enumerate(solved.items()):
         progress.at(done / len(solved))
         alignment = outcome.record.alignments[number]
@@ -45,12 +47,14 @@ def write_clouds(folder: Path, outcome: SessionOutcome, progress: Progress = Pro
             folder / f"alignment-{number}-cursor.ply",
             alignment.cursor_m,
             properties={"is_cut": alignment.cursor_is_cut.astype(np.uint8)},
+            comments=comments,
         )
         residuals_m = {f"residual_{eye}_m": shift.residuals_m for eye, shift in shifts.items()}
         write_ply(
             folder / f"alignment-{number}-hand.ply",
             alignment.hand_m,
             properties={"is_cut": alignment.hand_is_cut.astype(np.uint8)} | residuals_m,
+            comments=comments,
         )
 
 
@@ -84,7 +88,7 @@ def read_cloud(path: str | PathLike[str]) -> tuple[Float64, Bool | None]:
     >>> from tempfile import TemporaryDirectory
     >>> from handcal.export.clouds import write_clouds
     >>> from handcal.export.outcome import load_outcome
-    >>> session = handcal.open_session("resources/example_session")
+    >>> session = handcal.example_session()
     >>> with TemporaryDirectory() as folder:
     ...     write_clouds(Path(folder), load_outcome(session))
     ...     cursor_m, cursor_cut = handcal.read_cloud(f"{folder}/alignment-1-cursor.ply")
@@ -109,7 +113,7 @@ def read_cloud(path: str | PathLike[str]) -> tuple[Float64, Bool | None]:
         import open3d
     except ImportError as error:
         raise HandcalError(
-            "reading clouds needs Open3D, which is not installed", "pip install 'handcal[3d]'"
+            "reading clouds needs Open3D, which is not installed", extra_advice("3d")
         ) from error
     if path.suffix.lower() == ".xyz":
         return _parse_xyz(path, data), None

@@ -132,8 +132,11 @@ def write_slicer(folder: Path, outcome: SessionOutcome, progress: Progress = Pro
     """Write each eye's pose as ``LeftEyeToHead.tfm``, and the clouds as ``.vtk`` files, in mm.
 
     An ITK file holds the inverse of Slicer's transform, in LPS; the clouds say that they are RAS.
+    A comment of each file says what was simulated.
     """
     make_folder(folder)
+    simulated = outcome.record.simulated
+    comment = f"handcal, simulated: {simulated}" if simulated else "handcal"
     for eye in EYES:
         P_H = from_head(outcome, eye)
         center_m = -np.linalg.solve(P_H[:, :3], P_H[:, 3])
@@ -144,6 +147,7 @@ def write_slicer(folder: Path, outcome: SessionOutcome, progress: Progress = Pro
         numbers = [*from_parent[:3, :3].ravel(), *from_parent[:3, 3]]
         lines = (
             "#Insight Transform File V1.0",
+            f"# {comment}",
             "#Transform 0",
             "Transform: AffineTransform_double_3_3",
             f"Parameters: {' '.join(map(repr, map(float, numbers)))}",
@@ -155,7 +159,7 @@ def write_slicer(folder: Path, outcome: SessionOutcome, progress: Progress = Pro
     for done, (number, alignment) in enumerate(alignments.items()):
         progress.at(done / len(alignments))
         for kind, points_m in (("cursor", alignment.cursor_m), ("hand", alignment.hand_m)):
-            _write_vtk(folder / f"alignment-{number}-{kind}.vtk", points_m)
+            _write_vtk(folder / f"alignment-{number}-{kind}.vtk", points_m, comment)
 
 
 def from_head(outcome: SessionOutcome, eye: Eye) -> Float64:
@@ -164,14 +168,13 @@ def from_head(outcome: SessionOutcome, eye: Eye) -> Float64:
     return P
 
 
-def _write_vtk(path: Path, points_m: Float64) -> None:
+def _write_vtk(path: Path, points_m: Float64, comment: str) -> None:
     """Write a legacy VTK file with one vertex for each point; Slicer shows no bare points."""
     points_mm = slicer_points_mm(points_m).astype(">f8")
     count = len(points_mm)
     cells = np.column_stack([np.ones(count), np.arange(count)]).astype(">i4")
-    head = (
-        f"# vtk DataFile Version 3.0\nSPACE=RAS\nBINARY\nDATASET POLYDATA\nPOINTS {count} double\n"
-    )
+    title = f"{comment}. SPACE=RAS"  # as in Slicer's own files
+    head = f"# vtk DataFile Version 3.0\n{title}\nBINARY\nDATASET POLYDATA\nPOINTS {count} double\n"
     middle = f"\nVERTICES {count} {2 * count}\n"
     data = head.encode() + points_mm.tobytes() + middle.encode() + cells.tobytes() + b"\n"
     write_atomic(path, data)

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from handcal.core.errors import FileError, HandcalError
+from handcal.core.errors import FileError, HandcalError, extra_advice
 from handcal.core.geometry import invert, rigid, transform
 from handcal.core.progress import Progress
 from handcal.core.types import Eye, EyeDisplay, Float64
@@ -150,7 +150,7 @@ def inspect_session(
         known = ", ".join(map(str, scenes))
         raise FileError(f"{outcome.record.path} has no alignment {number}: it has {known}")
     if find_spec("open3d") is None:
-        raise HandcalError("Open3D is not installed", "pip install 'handcal[3d]'")
+        raise HandcalError("Open3D is not installed", extra_advice("3d"))
     if picture is None:
         if not _has_display():
             raise HandcalError(

@@ -9,6 +9,7 @@ from typing import get_args
 import numpy as np
 
 from handcal.core.errors import FileError
+from handcal.core.frozen import require_kind
 from handcal.core.types import Frame, HandCloud
 from handcal.hand.detect import DetectSettings, HandDetector
 from handcal.hand.finder import HandFinder
@@ -49,17 +50,19 @@ def segment(frame: Frame, *, roi: Roi = "detector") -> HandCloud:
         If there is no hand, or the image does not show all of it; the text says why.
     ValueError
         If `roi` is unknown.
+    TypeError
+        If `frame` is no `Frame`.
 
     Examples
     --------
     A frame of the simulated camera:
 
     >>> import handcal
-    >>> from handcal.sim.camera import simulated_frame
-    >>> hand = handcal.segment(simulated_frame(seed=1), roi="depth")
+    >>> hand = handcal.segment(handcal.simulated_frame(), roi="depth")
     >>> hand.points_m.shape[1], f"{hand.median_depth_m:.2f} m"
     (3, '0.48 m')
     """
+    require_kind("frame", frame, Frame)
     if roi not in get_args(Roi):
         raise ValueError(f"unknown roi {roi!r}: choose from {', '.join(get_args(Roi))}")
     return make_finder(SegmentSettings(roi=roi)).find(frame)

@@ -9,7 +9,7 @@ import re
 import secrets
 import shutil
 import stat
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -273,6 +273,7 @@ def write_ply(
     points_m: NDArray[np.floating],
     colors: UInt8 | None = None,
     properties: Mapping[str, NDArray[Any]] | None = None,
+    comments: Sequence[str] = (),
 ) -> None:
     """Write (N, 3) points in metres as binary PLY, in their own precision.
 
@@ -284,6 +285,8 @@ def write_ply(
         RGB.
     properties : mapping of name to (N,) float32, float64 or uint8, optional
         Further values of each point; floats may be NaN.
+    comments : sequence of str
+        Further lines of the header, in ASCII.
     """
     columns: dict[str, NDArray[Any]] = {axis: points_m[:, i] for i, axis in enumerate("xyz")}
     if colors is not None:
@@ -298,7 +301,7 @@ def write_ply(
     header = [
         "ply",
         "format binary_little_endian 1.0",
-        "comment metres",
+        *(f"comment {line}" for line in ("metres", *comments)),
         f"element vertex {len(vertices)}",
         *(
             f"property {_PLY_TYPES[column.dtype.str[1:]]} {name}"

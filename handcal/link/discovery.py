@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import ipaddress
 import socket
-import time
-from dataclasses import dataclass
 
-from zeroconf import Error, IPVersion, ServiceBrowser, ServiceInfo, ServiceStateChange, Zeroconf
+from zeroconf import Error, IPVersion, ServiceInfo, Zeroconf
 
 from handcal.core.errors import LinkError
 from handcal.io.closable import Closable
@@ -15,16 +13,7 @@ from handcal.link.transport import Address
 from handcal.link.wire import VERSION
 
 SERVICE = "_handcal._udp.local."
-_MAX_FOUND = 32
 _MAX_NAME = 60
-
-
-@dataclass(frozen=True, slots=True)
-class FoundPC:
-    """A PC that invites a headset."""
-
-    name: str
-    address: Address
 
 
 class Announcement(Closable):
@@ -57,42 +46,6 @@ class Announcement(Closable):
     def close(self) -> None:
         """Withdraw the announcement; safe to call twice."""
         self._zeroconf.close()
-
-
-def find_pcs(timeout_s: float = 2.0, interface: str = "") -> list[FoundPC]:
-    """Return the PCs that announce themselves on the local network now.
-
-    Raises
-    ------
-    LinkError
-        If the network does not allow it.
-    """
-    zeroconf = _open(interface)
-    names: set[str] = set()
-
-    def on_change(name: str, state_change: ServiceStateChange, **_: object) -> None:
-        if state_change is ServiceStateChange.Removed:
-            names.discard(name)
-        elif len(names) < _MAX_FOUND:
-            names.add(name)
-
-    try:
-        browser = ServiceBrowser(zeroconf, SERVICE, handlers=[on_change])
-        time.sleep(timeout_s)  # that nobody else answers cannot be known
-        browser.cancel()
-        pcs = (_look_up(zeroconf, name) for name in sorted(names))
-        return [pc for pc in pcs if pc is not None]
-    finally:
-        zeroconf.close()
-
-
-def _look_up(zeroconf: Zeroconf, name: str) -> FoundPC | None:
-    info = zeroconf.get_service_info(SERVICE, name)
-    addresses = info.parsed_addresses() if info is not None else []
-    if info is None or not addresses or not info.port:
-        return None
-    shown = "".join(char for char in name.removesuffix(f".{SERVICE}") if char >= " ")
-    return FoundPC(shown[:_MAX_NAME], (addresses[0], info.port))
 
 
 def _open(interface: str, *, is_ipv6: bool = False) -> Zeroconf:

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from handcal.core.conventions import opengl_transform
-from handcal.core.errors import HandcalError
+from handcal.core.errors import HandcalError, extra_advice
 from handcal.core.geometry import invert, rigid
 from handcal.core.types import EYES, Eye, Float64, HeadsetIdentity, HeadsetView
 from handcal.export.openxr import correction_owner
@@ -222,7 +222,7 @@ class Runtime(Closable):
             import xr
         except ImportError as error:
             raise HandcalError(
-                "the OpenXR client needs pyopenxr and glfw", "pip install 'handcal[openxr]'"
+                "the OpenXR client needs pyopenxr and glfw", extra_advice("openxr")
             ) from error
         self._xr: Any = xr
         self._glfw: Any = glfw

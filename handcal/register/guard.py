@@ -175,7 +175,7 @@ def rotation_between(cursor_m: ArrayLike, hand_m: ArrayLike) -> Float64:
     Examples
     --------
     >>> import handcal
-    >>> session = handcal.open_session("resources/example_session")
+    >>> session = handcal.example_session()
     >>> alignment = session.alignments[1]
     >>> rotation_rad = handcal.rotation_between(alignment.cursor_m, alignment.hand_m)
     >>> print(f"{np.degrees(np.linalg.norm(rotation_rad)):.1f}°")

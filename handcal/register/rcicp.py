@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 from small_gicp import KdTree
 
-from handcal.core.errors import HandcalError
+from handcal.core.errors import HandcalError, extra_advice
 from handcal.core.geometry import rigid, transform
 from handcal.core.types import Float64
 from handcal.register.model import fit_shift, predict
@@ -155,8 +155,7 @@ def solve_icp_open3d(
         import open3d
     except ImportError as error:
         raise HandcalError(
-            "the method icp-open3d needs Open3D: pip install 'handcal[3d]'",
-            "icp needs nothing",
+            "the method icp-open3d needs Open3D", f"{extra_advice('3d')}, or choose icp"
         ) from error
     registration = open3d.pipelines.registration
     cursor, hand = (

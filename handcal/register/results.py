@@ -62,28 +62,45 @@ class SolveSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Results:
-    """Fused eye shifts of all alignments of one wearer, with verdicts."""
+    """Fused eye shifts of all alignments of one wearer, with verdicts.
+
+    Attributes
+    ----------
+    method
+        Solver of each alignment.
+    alignments
+        Each alignment alone, without prior, by number.
+    eyes
+        Fused estimates.
+    verdicts
+        Decision whether each eye's φ may be used, with its reason.
+    eye_distance_m
+        Eye distance implied by `eyes`; None unless both eyes are solved.
+    measured_eye_distance
+        The wearer's, as used; None if it was not measured.
+    benefits
+        Expected error of each eye without the calibration and with it.
+    advice
+        Further alignments that would lead to *accept*, for each eye with the verdict *repeat*.
+    expected_after_another_arcmin
+        Expected error after one more alignment with all solved eyes open.
+    fused
+        The observations and the prior behind `eyes`.
+    verified
+        The outcome of the verifications of each verified eye.
+    """
 
     method: Method
     alignments: Mapping[int, Mapping[Eye, EyeShift]]
-    """Each alignment alone, without prior, by number."""
     eyes: Mapping[Eye, EyeShift]
-    """Fused estimates."""
     verdicts: Mapping[Eye, Verdict]
     eye_distance_m: float | None
-    """Eye distance implied by `eyes`; None unless both eyes are solved."""
     measured_eye_distance: EyeDistance | None
-    """The wearer's, as used; None if it was not measured."""
     benefits: Mapping[Eye, Benefit]
-    """Expected error of each eye without the calibration and with it."""
     advice: Mapping[Eye, Advice]
-    """Further alignments that would lead to *accept*, for each eye with the verdict *repeat*."""
     expected_after_another_arcmin: Mapping[Eye, float]
-    """Expected error after one more alignment with all solved eyes open."""
     fused: Fused
-    """The observations and the prior behind `eyes`."""
     verified: Mapping[Eye, Verified] = field(default_factory=dict)
-    """The outcome of the verifications of each verified eye."""
 
     @property
     def evidence(self) -> tuple[str, ...]:

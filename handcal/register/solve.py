@@ -79,7 +79,7 @@ def solve_eye_shift(
     Examples
     --------
     >>> import handcal
-    >>> session = handcal.open_session("resources/example_session")
+    >>> session = handcal.example_session()
     >>> alignment = session.alignments[1]
     >>> shift = handcal.solve_eye_shift(
     ...     alignment.cursor_m,
@@ -178,7 +178,7 @@ def check_cloud(name: str, points_m: ArrayLike) -> Float64:
     if np.linalg.eigvalsh(scatter_m2)[1] < _LEAST_WIDTH_M**2:
         raise ValueError(f"{name} has all its points on one line; a hand's surface is needed")
     if np.trace(scatter_m2) > _WIDEST_M**2:
-        raise ValueError(f"{name} is wider than any hand; metres are needed")
+        raise ValueError(f"{name} looks like millimetres: it is wider than any hand in metres")
     return cloud
 
 

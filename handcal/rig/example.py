@@ -20,6 +20,12 @@ def example_rig() -> Rig:
     Virtual image at 2 m, viewpoints 63 mm apart. The rig's origin H is its colour camera, 40 mm
     above and 50 mm in front of the middle of the viewpoints. The depth camera sits 70 mm above the
     viewpoints and looks 15° down, so that all of both displays lies in its view from 0.4 to 0.6 m.
+
+    Examples
+    --------
+    >>> import handcal
+    >>> handcal.example_rig().eyes["left"].z_C0_S_m
+    2.0
     """
     return Rig(
         name="Example: HoloLens 1 with RealSense D415",

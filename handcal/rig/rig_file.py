@@ -228,7 +228,7 @@ def write_rig(path: str | PathLike[str], rig: Rig) -> None:
     >>> from dataclasses import replace
     >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
-    >>> rig = handcal.read_rig("resources/example_rig.yaml")
+    >>> rig = handcal.example_rig()
     >>> with TemporaryDirectory() as folder:
     ...     path = Path(folder) / "rig.yaml"
     ...     handcal.write_rig(path, replace(rig, name="My headset"))
@@ -267,7 +267,7 @@ def read_rig(path: str | PathLike[str]) -> Rig:
     Examples
     --------
     >>> import handcal
-    >>> rig = handcal.read_rig("resources/example_rig.yaml")
+    >>> rig = handcal.read_rig(handcal.example_session().path / "rig.yaml")
     >>> rig.eyes["left"].K.shape, rig.eyes["left"].z_C0_S_m
     ((3, 3), 2.0)
     """

@@ -39,54 +39,93 @@ MAX_NOTES_CHARACTERS = 20_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SessionRecord:
-    """The contents of a session folder."""
+    """The contents of a session folder.
+
+    Attributes
+    ----------
+    path
+        The session's folder.
+    rig
+        The rig of the session.
+    settings
+        The contents of ``settings.json``.
+    wearer
+        Name or code; empty if none was given.
+    notes
+        Free text; empty if there is none.
+    events
+        The journal, oldest first.
+    alignments
+        The alignments that are not deleted, by number, in the order in which they were saved.
+    deleted_alignments
+        The deleted ones, likewise.
+    trials
+        Trials of the user test that are not deleted, by number.
+    deleted_trials
+        The deleted ones, likewise.
+    results
+        The newest results; None if none were saved since an alignment was deleted or restored, or
+        the eye distance or a verification was changed.
+    is_solved
+        True if the results are those of all `alignments`.
+    is_applied
+        True if the headset has acknowledged the projections of these results.
+    applied_shift_m
+        each (3,); the φ that the headset rendered with last, solved or set by hand; a missing eye
+        was rendered with the offline calibration.
+    fine_tuned
+        each (3,); the φ last set by hand; None if none was set since the last results.
+    is_finished
+        True if the session was finished, and nothing but `ASIDE` was recorded since.
+    journal_bytes
+        Length of the journal's complete lines.
+    torn_bytes
+        Length of an incomplete last line, which is ignored; 0 if there is none.
+    facts
+        What was measured or chosen in the session: eye distance, plan, camera, headset,
+        verifications.
+    verified_now
+        Eyes verified with the present alignments.
+    alignment_facts
+        Of each alignment, deleted ones too.
+    last_alignment
+        Greatest number of an alignment, lost ones too; the next one is greater.
+    set_by_hand_m
+        each (3,); φ last set by hand since the results, of the eyes that are drawn with it.
+    went_back
+        True if φ was last set by going back, and not for every eye to one set by hand.
+    damaged
+        Parts that are damaged; their contents are missing here, or were read from a copy.
+    unwritten
+        The events that could not be written yet, and are only in the program's memory.
+    """
 
     path: Path
     rig: Rig
     settings: dict[str, Any]
     wearer: str
-    """Name or code; empty if none was given."""
     notes: str
     events: tuple[Event, ...]
     alignments: Mapping[int, Alignment]
-    """The alignments that are not deleted, by number, in the order in which they were saved."""
     deleted_alignments: Mapping[int, Alignment]
     trials: Mapping[int, Trial]
     deleted_trials: Mapping[int, Trial]
-    """Trials of the user test, likewise."""
     results: dict[str, Any] | None
-    """The newest results; None if none were saved since an alignment was deleted or restored, or
-    the eye distance or a verification was changed."""
     is_solved: bool
-    """True if the results are those of all `alignments`."""
     is_applied: bool
-    """True if the headset has acknowledged the projections of these results."""
     applied_shift_m: Mapping[Eye, Float64]
-    """each (3,); the φ that the headset rendered with last, solved or set by hand; a missing eye
-    was rendered with the offline calibration."""
     fine_tuned: Mapping[Eye, Float64] | None
-    """each (3,); the φ last set by hand; None if none was set since the last results."""
     is_finished: bool
-    """True if the session was finished, and nothing but `ASIDE` was recorded since."""
     journal_bytes: int
-    """Length of the journal's complete lines."""
     torn_bytes: int
-    """Length of an incomplete last line, which is ignored; 0 if there is none."""
     facts: SessionFacts = field(default_factory=SessionFacts)
     verified_now: frozenset[Eye] = frozenset()
-    """Eyes verified with the present alignments."""
     alignment_facts: Mapping[int, AlignmentFacts] = field(default_factory=dict)
-    """Of each alignment, deleted ones too."""
     last_alignment: int = 0
-    """Greatest number of an alignment, lost ones too; the next one is greater."""
     set_by_hand_m: Mapping[Eye, Float64] = field(default_factory=dict)
-    """each (3,); φ last set by hand since the results, of the eyes that are drawn with it."""
     went_back: bool = False
-    """True if φ was last set by going back, and not for every eye to one set by hand."""
     damaged: tuple[Damage, ...] = ()
-    """Parts that are damaged; their contents are missing here, or were read from a copy."""
     unwritten: tuple[Event, ...] = ()
-    """The events that could not be written yet, and are only in the program's memory."""
 
     @property
     def is_solvable(self) -> bool:

@@ -44,6 +44,7 @@ from handcal.io.files import (
     write_new,
 )
 from handcal.io.lock import FileLock
+from handcal.io.resources import resource_path
 from handcal.rig.rig_file import MAX_RIG_BYTES, write_rig
 from handcal.session.alignment_file import encode_alignment
 from handcal.session.in_force import end_at_close
@@ -443,11 +444,23 @@ def open_session(path: str | PathLike[str]) -> SessionRecord:
     Examples
     --------
     >>> import handcal
-    >>> session = handcal.open_session("resources/example_session")
+    >>> session = handcal.open_session(handcal.example_session().path)
     >>> session.wearer, len(session.alignments), len(session.trials)
     ('Simulated wearer', 2, 6)
     """
     return Session.open(Path(path))
+
+
+def example_session() -> SessionRecord:
+    """Return the session shipped with handcal: a simulated wearer with two alignments and trials.
+
+    Examples
+    --------
+    >>> import handcal
+    >>> handcal.example_session().wearer
+    'Simulated wearer'
+    """
+    return open_session(resource_path("example_session"))
 
 
 def _rig_text(path: Path) -> str:

@@ -211,6 +211,18 @@ def simulated_frame(seed: int = 1) -> Frame:
     ----------
     seed : int
         Of the hand, the room and the sensor's noise.
+
+    Returns
+    -------
+    Frame
+        Depth and colour, aligned, with their intrinsics.
+
+    Examples
+    --------
+    >>> import handcal
+    >>> frame = handcal.simulated_frame()
+    >>> frame.depth.shape, frame.color.shape
+    ((720, 1280), (720, 1280, 3))
     """
     held_up = rigid([0.1, 0.1, 0.05], [0.0, 0.02, 0.5])
     world = World(make_hand(seed), make_room(seed))

@@ -111,6 +111,9 @@ def test_a_missing_library_names_its_extra(
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(CameraError, match=rf"pip install 'handcal\[{extra}\]'"):
         camera()
+    monkeypatch.setattr(sys, "frozen", True, raising=False)  # in the Debian package, without pip
+    with pytest.raises(CameraError, match="install handcal's wheel"):
+        camera()
 
 
 def test_a_live_camera_is_opened_by_name(orbbec: OrbbecStandIn, oak: OakStandIn) -> None:

@@ -1,5 +1,4 @@
 import json
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +11,9 @@ from handcal.core.geometry import rigid
 from handcal.core.types import Frame, Intrinsics
 from handcal.rig.cube import Cube
 from handcal.rig.example import example_rig
+from handcal.session.session import Session
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter
-from tests.helpers import ROOT
 
 CAMERA = Intrinsics(640, 360, 502.0, 502.0, 319.5, 179.5)
 T_D_T = rigid([0, 0, 0.1], [0, 0, 0.45]) @ rigid([0.5, 0, 0]) @ rigid([0, 0.7, 0])
@@ -54,10 +53,16 @@ def test_the_cube_of_a_recording_is_tracked(
     assert "40 poses in 40 frames" in capsys.readouterr().out
 
 
-def test_a_session_of_a_real_wearer_has_no_simulated_one(tmp_path: Path) -> None:
-    session = tmp_path / "session"
-    shutil.copytree(ROOT / "resources" / "example_session", session)
-    with pytest.raises(HandcalError, match="not of a simulated wearer"):
-        run("trials", session, "--headset", "virtual", "--camera", "simulator")
-    with pytest.raises(HandcalError, match="go together"):
-        run("trials", session, "--headset", "virtual", "--camera", "realsense")
+@pytest.mark.parametrize("seed", [{}, {"seed": 3}])
+@pytest.mark.parametrize("headset", ["virtual", "network"])
+def test_only_a_wearer_of_the_virtual_headset_makes_simulated_trials(
+    tmp_path: Path, headset: str, seed: dict[str, int]
+) -> None:
+    settings = {"station": {"headset": headset, **seed}}
+    with Session.create(tmp_path, example_rig(), settings, name="one") as session:
+        pass
+    is_simulated = bool(seed) and headset == "virtual"
+    # A simulated one gets farther, and is refused because it is empty.
+    problem = "left eye is not solved" if is_simulated else "virtual headset has no such wearer"
+    with pytest.raises(HandcalError, match=problem):
+        run("trials", session.path, "--headset", "virtual", "--camera", "simulator")

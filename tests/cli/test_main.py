@@ -21,6 +21,7 @@ import numpy as np
 import pytest
 
 from handcal.cli.main import purpose
+from handcal.cli.output import console
 from handcal.core.progress import Progress
 from handcal.core.types import Alignment
 from handcal.io.resources import resource_path
@@ -102,6 +103,21 @@ def test_doctor_fails_only_for_what_must_be_mended(
         ("headset --port 0", "'0' is not a whole number from 1 to 65535"),
         ("headset", "give --port and a pairing key, or --pair"),
         ("bench --json", "expected one argument"),
+        ("bench --only foo", "unknown part 'foo'; choose from speed, peers"),
+        ("demo --slipped", "--slipped needs --from SESSION"),
+        ("rig board", "no output given"),
+        ("rig board --pdf b.pdf --squares 30 30", "too few for 30×30 squares"),
+        ("rig board --dictionary FOO --png b.png", "unknown dictionary FOO"),
+        ("rig board --marker-mm 30 --png b.png", "0.3 to 0.95 of the squares' side"),
+        ("rig make --output x.yaml", "give either --stereo or --factory"),
+        ("rig make --factory foo --output x.yaml", "a headset is hololens2:HOST, not foo"),
+        ("rig stereo --depth a --headset b --format ros", "ROS camera_info has no pose"),
+        ("rig display-check --rig a --output b --viewpoint c", "'c' is not a whole number"),
+        ("study procedures --plan foo", "unknown plan 'foo'"),
+        ("evaluate cube net --side-mm 5 --pdf x.pdf", "between 10 mm and 1 m"),
+        ("evaluate cube capture x --positions a a", "a is named twice"),
+        ("evaluate detector", "no photographs to measure"),
+        ("evaluate trials x --headset virtual --camera foo", "go together"),
         ("doctor --json it", "unrecognized arguments"),
     ],
 )
@@ -120,8 +136,10 @@ def test_misuse_is_one_line_and_exit_code_2(
     [
         ("segment --color a --depth b --intrinsics c --output d", "cannot read c: No such file"),
         ("solve nowhere", "nowhere is not a session"),
-        ("bench --json one_session", "cannot write one_session: is a folder"),
-        ("bench --json one_session/journal.jsonl/a", "journal.jsonl is not a folder"),
+        ("bench --json one_session", "cannot write one_session: it is a folder"),
+        ("bench --json one_session/journal.jsonl/a", "journal.jsonl (Not a directory)"),
+        ("inspect nowhere --picture one_session", "cannot write one_session: it is a folder"),
+        ("evaluate detector one_session", "cannot read one_session/annotations.json"),
         ("prior one_session", "one_session is one session; choose the folder above"),
         ("replay text.txt", "text.txt is not a recording"),
         ("demo --rig text.txt --output out", "text.txt"),
@@ -240,6 +258,34 @@ def test_an_output_that_cannot_be_written_is_one_line(argument: str) -> None:
         )
     assert ended.returncode == 1
     assert ended.stderr == "handcal: cannot write the output: No space left on device\n"
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("name", ["-", "/dev/stdout"])
+def test_results_can_be_piped_with_nothing_else(name: str) -> None:
+    words = "-m handcal solve --json"
+    ended = subprocess.run(
+        [sys.executable, *words.split(), name, resource_path("example_session")],
+        capture_output=True,
+        check=True,
+        text=True,
+    )
+    assert set(json.loads(ended.stdout)["eyes"]) == {"left", "right"}
+    assert "φ, mm" in ended.stderr
+
+
+@pytest.mark.parametrize("width", [20, 40, 80])
+def test_a_table_is_whole_at_every_width(
+    handcal: Callable[..., None],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    width: int,
+) -> None:
+    monkeypatch.setattr(console, "width", width)
+    handcal("solve", resource_path("example_session"))
+    shown = capsys.readouterr().out
+    assert "left    4.2 -4.4 0.9   1.1 1.0 2.5      1.55      97 %      Good" in shown
+    assert "…" not in shown
 
 
 @pytest.mark.process

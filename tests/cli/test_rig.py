@@ -92,7 +92,7 @@ def test_camera_then_stereo_then_conversion(
     np.testing.assert_allclose(found[:3, 3], T_H_D[:3, 3], atol=1e-3)
 
     for source, kind in ((camera, "json"), (stereo, "opencv")):
-        rig("convert", source, tmp_path / "converted", "--format", kind)
+        rig("convert", source, "--output", tmp_path / "converted", "--format", kind)
     np.testing.assert_allclose(read_pose(tmp_path / "converted"), found, atol=1e-12)
 
 
@@ -100,15 +100,17 @@ def test_what_other_programs_wrote_is_converted(
     rig: Callable[..., None], shared_data: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     files, output = shared_data / "field" / "rigfiles", tmp_path / "camera.json"
-    rig("convert", files / "kalibr_camchain.yaml", output, "--format", "json")
+    rig("convert", files / "kalibr_camchain.yaml", "--output", output, "--format", "json")
     assert read_intrinsics(output).fx == 1307.1793378428877
     assert "camera cam0 is used, of cam0, cam1" in caplog.text
-    rig("convert", files / "kalibr_camchain.yaml", output, "--format", "ros", "--camera", "cam1")
+    to_ros = "--format", "ros", "--camera", "cam1"
+    rig("convert", files / "kalibr_camchain.yaml", "--output", output, *to_ros)
     assert read_intrinsics(output).fx == 1313.9722271268822
-    rig("convert", files / "opencv_KD.yml", output, "--format", "opencv", "--size", 1280, 720)
+    to_opencv = "--format", "opencv", "--size", 1280, 720
+    rig("convert", files / "opencv_KD.yml", "--output", output, *to_opencv)
     assert read_intrinsics(output).cx == 649.37
     with pytest.raises(SystemExit):
-        rig("convert", files / "stereo_extrinsics_mm.yml", output, "--format", "json")
+        rig("convert", files / "stereo_extrinsics_mm.yml", "--output", output, "--format", "json")
 
 
 def test_what_is_bad_is_not_written(
@@ -132,10 +134,9 @@ def test_what_is_bad_is_not_written(
     ("arguments", "said"),
     [
         (("board", "--png", "b.txt"), "b.txt must end in .png"),
-        (("board", "--pdf", "b.pdf", "--squares", "30", "30"), "too few for 30×30 squares"),
         (("camera", "nowhere"), "no PNG, JPEG, TIFF, BMP or PGM images"),
         (
-            ("camera", "{depth}", *CHECKERBOARD, "--drop", "x.png"),
+            ("camera", "no.png", *CHECKERBOARD, "--drop", "x.png"),  # before any image is read
             "there is no image x.png to drop",
         ),
         (
@@ -143,8 +144,7 @@ def test_what_is_bad_is_not_written(
             "both cameras' images are the same",
         ),
         (("camera", "{depth}"), "found in 0 of 5 images used, at least 3 are needed; mostly: a"),
-        (("stereo", "--depth", "{depth}", "--headset", "{depth}", "--format", "ros"), "no pose"),
-        (("convert", "{depth}/depth0.png", "out", "--format", "json"), "depth0.png"),
+        (("convert", "{depth}/depth0.png", "--output", "out", "--format", "json"), "depth0.png"),
     ],
 )
 def test_what_is_wrong_is_one_line(

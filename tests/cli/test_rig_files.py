@@ -116,9 +116,6 @@ def test_a_headset_tells_the_pose_of_its_own_camera(
     assert made.depth_camera == CameraIdentity("HoloLens 2 AHAT")
     assert made.depth_intrinsics.width == 512
     assert "T_H_D" not in made.origins
-    with pytest.raises(HandcalError, match="not realsense"):
-        run(*make, "--factory", "realsense")
-    with pytest.raises(HandcalError, match="a headset is hololens2:HOST, not"):
-        run(*make, "--factory", "hololens2:127.0.0.1,realsense=rig.yaml")
-    with pytest.raises(HandcalError, match="either --stereo or --factory"):
-        run(*make)
+    for misuse in (["--factory", "hololens2:127.0.0.1,realsense=rig.yaml"], []):
+        with pytest.raises(SystemExit, match="2"):
+            run(*make, *misuse)

@@ -6,21 +6,25 @@ After a deliberate change, write the list again: ``python -m tests.cli.test_surf
 from __future__ import annotations
 
 import json
+import os
 import pkgutil
+import shlex
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
 from importlib.metadata import version
+from pathlib import Path
 from typing import get_args
 
 import pytest
 
 import handcal.cli
-from handcal.cli.main import COMMANDS, Group, load, purpose
+from handcal.cli.main import COMMANDS, Group, load, parse, purpose
 from handcal.cli.terminal import Command, Parser
 from handcal.export.formats import FORMATS, TOOL_FORMATS, Format
-from tests.helpers import DATA
+from tests.helpers import DATA, ROOT
 
 COMMAND_LIST = DATA / "commands.json"
 FORMAT_LIST = [
@@ -98,6 +102,53 @@ def test_every_command_has_help(
         shown = capsys.readouterr().out
         assert shown.startswith(f"usage: handcal {words} ")
         assert "None" not in shown
+        assert f"\nexample:\n  handcal {words}" in shown
+
+
+def test_every_example_is_understood(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for words, module in leaves():
+        command = load(words.split()[-1], module)
+        assert parse(shlex.split(command.example)[1:]).command is command.run
+
+
+COMPLETE = """
+source "$0"
+COMP_WORDS=(handcal "$@")
+COMP_CWORD=$#
+_handcal
+printf '%s\\n' "${COMPREPLY[@]}"
+"""
+
+
+@pytest.mark.process
+@pytest.mark.skipif(shutil.which("bash") is None, reason="completes in bash")
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        (["so"], {"solve"}),
+        (["rig", "c"], {"camera", "check", "compare", "convert"}),
+        (["evaluate", "cube", ""], {"capture", "net", "report", "simulate", "track"}),
+        (["pair", "--m"], {"--minutes"}),
+        (["rig", "board", "--png", "a.png", "--pa"], {"--paper"}),
+        (["rig", "board", "--paper", "a"], {"a0", "a1", "a2", "a3", "a4"}),
+        (["openxr", "use", "a session", "--k"], {"--keep"}),
+        (["rig", "nonsense", ""], {""}),
+    ],
+)
+def test_bash_completes(line: list[str], expected: set[str], tmp_path: Path) -> None:
+    program = tmp_path / "handcal"
+    program.write_text(f'#!/bin/sh\nexec {sys.executable} -m handcal "$@"\n')
+    program.chmod(0o755)
+    ended = subprocess.run(
+        ["bash", "-c", COMPLETE, ROOT / "installer/linux/handcal.bash", *line],
+        env=os.environ | {"PATH": f"{tmp_path}{os.pathsep}{os.environ['PATH']}"},
+        capture_output=True,
+        check=True,
+        text=True,
+    )
+    assert set(ended.stdout.splitlines()) == expected
+    assert ended.stderr == ""
 
 
 @pytest.mark.parametrize(

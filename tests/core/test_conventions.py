@@ -10,12 +10,12 @@ from handcal.core.conventions import (
     openxr_view,
     pose,
     unity_camera,
-    unity_transform,
 )
 from handcal.core.display import projection_matrix, update_matrix
 from handcal.core.geometry import invert, project, rigid, transform
 from handcal.core.types import EYES, Eye, Float64, Projection
 from handcal.rig.example import example_rig
+from tests.helpers import unity_transform
 
 WIDTH_PX, HEIGHT_PX = 200, 100
 HALF = np.sqrt(0.5)  # sine and cosine of 45°

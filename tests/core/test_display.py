@@ -11,13 +11,13 @@ from handcal.core.display import (
     effect_at,
     eye_projection,
     projection_matrix,
-    reprojection_error_px,
     update_matrix,
     view_of_eye,
 )
 from handcal.core.geometry import project, rigid, transform
 from handcal.core.types import EyeDisplay, Float64
 from handcal.rig.example import example_rig
+from tests.helpers import reprojection_error_px
 
 DISPLAY = example_rig().eyes["right"]
 SHIFTS = st.tuples(*[st.floats(-0.02, 0.02)] * 3)

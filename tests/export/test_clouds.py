@@ -172,3 +172,6 @@ def test_without_open3d_reading_says_so(tmp_path: Path, monkeypatch: pytest.Monk
     (tmp_path / "cloud.xyz").write_text("0 0 0\n")
     with pytest.raises(HandcalError, match=r"pip install 'handcal\[3d\]'"):
         read_cloud(tmp_path / "cloud.xyz")
+    monkeypatch.setattr(sys, "frozen", True, raising=False)  # in the Debian package
+    with pytest.raises(HandcalError, match="install the package handcal-open3d"):
+        read_cloud(tmp_path / "cloud.xyz")

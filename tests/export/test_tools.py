@@ -16,6 +16,7 @@ from handcal.core.conventions import slicer_points_mm
 from handcal.core.errors import FileError
 from handcal.core.geometry import invert, project, transform
 from handcal.core.types import EYES, Eye, Float64, Rig
+from handcal.export.clouds import write_clouds
 from handcal.export.export import ExportSettings, export_session
 from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.export.tools import write_openxr, write_slicer, write_unity
@@ -75,11 +76,26 @@ def test_openxr_refuses_a_skewed_projection(tmp_path: Path, record: SessionRecor
         write_openxr(tmp_path / "openxr.json", load_outcome(replace(record, rig=rig)))
 
 
+def test_every_cloud_and_pose_says_what_was_simulated(
+    tmp_path: Path, record: SessionRecord
+) -> None:
+    for headset, expected in (("virtual", True), ("network", False)):
+        settings = {**record.settings, "station": {"source": "realsense", "headset": headset}}
+        outcome = load_outcome(replace(record, settings=settings))
+        write_slicer(tmp_path / headset, outcome)
+        write_clouds(tmp_path / headset, outcome)
+        files = list((tmp_path / headset).iterdir())
+        assert {path.suffix for path in files} == {".tfm", ".vtk", ".ply"}
+        for path in files:
+            told = b"simulated: headset and wearer" in path.read_bytes()[:200]
+            assert told == expected, path.name
+
+
 def read_itk(path: Path) -> Float64:
     """Return Slicer's transform to parent, in RAS, as it reads an ITK affine file."""
     lines = path.read_text().splitlines()
     assert lines[0] == "#Insight Transform File V1.0"
-    fields = dict(line.split(": ", 1) for line in lines[2:])
+    fields = dict(line.split(": ", 1) for line in lines if not line.startswith("#"))
     assert fields["Transform"] == "AffineTransform_double_3_3"
     numbers = [float(word) for word in fields["Parameters"].split()]
     assert [float(word) for word in fields["FixedParameters"].split()] == [0.0, 0.0, 0.0]
@@ -95,7 +111,9 @@ def read_vtk(path: Path) -> tuple[Float64, NDArray[np.int32]]:
     data = path.read_bytes()
     head, rest = data.split(b" double\n", 1)
     *lines, points = head.decode().splitlines()
-    assert lines == ["# vtk DataFile Version 3.0", "SPACE=RAS", "BINARY", "DATASET POLYDATA"]
+    assert lines[0] == "# vtk DataFile Version 3.0"
+    assert lines[1].endswith(". SPACE=RAS")  # Slicer looks for it in the whole line
+    assert lines[2:] == ["BINARY", "DATASET POLYDATA"]
     count = int(points.removeprefix("POINTS "))
     cloud = np.frombuffer(rest, ">f8", 3 * count).reshape(-1, 3)
     line, cells = rest[24 * count + 1 :].split(b"\n", 1)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handcal.core.conventions import opengl_transform, pose, unity_transform
+from handcal.core.conventions import opengl_transform, pose
 from handcal.core.display import projection_matrix, target_corners_m
 from handcal.core.errors import PoseError
 from handcal.core.geometry import invert, project, rigid, transform
@@ -25,7 +25,7 @@ from handcal.link.shapes import Shape, Target
 from handcal.rig.example import example_rig
 from tests.headset.conftest import PACKAGE
 from tests.headset.unity_player import PATIENCE_S, UnityPlayer, numbers
-from tests.helpers import ROOT, eventually
+from tests.helpers import ROOT, eventually, unity_transform
 
 pytestmark = pytest.mark.process
 DEFINES = "HANDCAL_OPENXR_TIME;UNITY_WSA;ENABLE_LEGACY_INPUT_MANAGER;UNITY_2020_2_OR_NEWER"

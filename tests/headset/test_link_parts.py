@@ -10,7 +10,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import handcal
-from handcal.core.conventions import unity_transform
 from handcal.core.display import projection_matrix
 from handcal.core.geometry import rigid
 from handcal.core.types import EYES, Eye, Float64
@@ -18,6 +17,7 @@ from handcal.link import handcal_pb2 as pb
 from handcal.link import messages
 from handcal.rig.example import example_rig
 from tests.headset.conftest import Ask
+from tests.helpers import unity_transform
 
 pytestmark = pytest.mark.process
 NEAR_M, FAR_M = 0.1, 30.0

@@ -39,6 +39,9 @@ def test_it_carries_manual_protocol_examples_and_unity_package(wheel: Path) -> N
         wanted = {path.relative_to(ROOT).as_posix() for path in ROOT.glob(pattern)}
         assert wanted
         assert wanted <= carried
+        assert any(name.endswith("/completions/handcal") for name in archive.namelist())
+    tools = {name for name in carried if re.fullmatch(r"docs/.*\.(py|sh|js)", name)}
+    assert tools == {"docs/drawings.py"}  # of the tutorial; the others are of use in a checkout
     layer = ROOT / "resources/openxr"  # sources, and what has been built of them
     assert {f"openxr/{path.name}" for path in layer.glob("*.*")} <= carried
     unity = ROOT / "resources/unity"

@@ -10,13 +10,14 @@ import pytest
 
 from handcal.calibration.hands import PlacedHand
 from handcal.calibration.procedure import Calibration
-from handcal.core.display import eye_projection, reprojection_error_px, target_corners_m
+from handcal.core.display import eye_projection, target_corners_m
 from handcal.core.geometry import project
 from handcal.core.types import EYES, Float64, HandCloud
 from handcal.rig.example import FOCAL_PX, example_rig
 from handcal.station import wearer_view
 from handcal.station.settings import StationSettings
 from handcal.station.wearer_view import EyeView, EyeViews, render_eye_view
+from tests.helpers import reprojection_error_px
 
 DISPLAY = example_rig().eyes["left"]
 OUTLINE_M = np.array([[x, y, 0.5] for x in (-0.04, 0.04) for y in (-0.03, 0.03)])

@@ -76,12 +76,15 @@ def read_annotations(images: Path, annotations: Path) -> list[Photo]:
     Raises
     ------
     FileError
-        If the file cannot be read or is not of that format.
+        If the file cannot be read, is not of that format or lists no photograph.
     """
     try:
-        return [_photo(images, name, entry) for name, entry in read_json(annotations).items()]
+        photos = [_photo(images, name, entry) for name, entry in read_json(annotations).items()]
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise FileError(f"{annotations} is not a file of hand annotations: {error!r}") from error
+    if not photos:
+        raise FileError(f"{annotations} lists no photograph", "choose another folder")
+    return photos
 
 
 def _photo(images: Path, name: str, entry: dict[str, Any]) -> Photo:

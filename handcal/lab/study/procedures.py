@@ -15,7 +15,6 @@ from typing import Any, cast
 import numpy as np
 
 from handcal.core.display import TARGET_DEPTHS_M, arcmin_from_px, target_corners_m
-from handcal.core.errors import HandcalError
 from handcal.core.geometry import invert, project, transform
 from handcal.core.progress import Progress
 from handcal.core.types import EYES, CameraIdentity, DepthEdges, Eye, Float64
@@ -102,22 +101,21 @@ class ProcedureRow:
     """Ratio of their means."""
 
 
-def procedure_cases(settings: ProcedureStudySettings, progress: Progress = Progress()) -> Study:
-    """Return the study that the settings describe.
-
-    Raises
-    ------
-    HandcalError
-        If a plan or variant is unknown.
-    """
+def require_known(settings: ProcedureStudySettings) -> None:
+    """Raise ValueError if a plan or a variant is unknown."""
     for plan in settings.plans:
         if plan not in _PLAIN and not 6 <= _spaam_count(plan) <= 1000:
-            raise HandcalError(
+            raise ValueError(
                 f"unknown plan {plan!r}: choose from {', '.join(_PLAIN)}, spaam-N (6 to 1000)"
             )
     for variant in settings.variants:
         if variant not in VARIANTS:
-            raise HandcalError(f"unknown variant {variant!r}: choose from {', '.join(VARIANTS)}")
+            raise ValueError(f"unknown variant {variant!r}: choose from {', '.join(VARIANTS)}")
+
+
+def procedure_cases(settings: ProcedureStudySettings, progress: Progress = Progress()) -> Study:
+    """Return the study that the settings describe; errors as of `require_known`."""
+    require_known(settings)
     model = ProcedureModel(
         sensor=settings.sensor,
         fatten_px=settings.fatten_px,

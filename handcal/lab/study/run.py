@@ -26,7 +26,7 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, TypeAlias
 
-from handcal.core.errors import CancelledError, HandcalError
+from handcal.core.errors import CancelledError, HandcalError, extra_advice
 from handcal.core.progress import Progress
 from handcal.lab.study.store import StudyFolder, StudyRow, holds_study
 
@@ -233,9 +233,7 @@ def _cluster(address: str) -> Iterator[Executor]:
         from distributed import Client, KilledWorker
         from distributed.comm.core import connect
     except ImportError as error:
-        raise HandcalError(
-            "studies on a cluster need Dask", "install it with pip install handcal[cluster]"
-        ) from error
+        raise HandcalError("studies on a cluster need Dask", extra_advice("cluster")) from error
 
     async def reach() -> None:
         # A client that cannot connect prints a traceback when Python ends.

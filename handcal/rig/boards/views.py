@@ -142,6 +142,12 @@ def _presumed(views: Sequence[BoardImage]) -> str:
     return reasons.pop() if is_common else ""
 
 
+def require_names(dropped: Iterable[str], names: Iterable[str]) -> None:
+    """Raise ViewsError if an image to drop is not among the names."""
+    if unknown := set(dropped) - set(names):
+        raise ViewsError(f"there is no image {', '.join(sorted(unknown))} to drop")
+
+
 def drop(views: Iterable[BoardImage], names: Collection[str]) -> tuple[BoardImage, ...]:
     """Return the views with exactly those in `names` left out.
 
@@ -151,9 +157,7 @@ def drop(views: Iterable[BoardImage], names: Collection[str]) -> tuple[BoardImag
         If a name is not that of a view.
     """
     views = tuple(views)
-    unknown = set(names) - {view.name for view in views}
-    if unknown:
-        raise ViewsError(f"there is no image {', '.join(sorted(unknown))} to drop")
+    require_names(names, (view.name for view in views))
     return tuple(replace(view, dropped=view.name in names) for view in views)
 
 

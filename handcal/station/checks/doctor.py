@@ -18,7 +18,7 @@ from pathlib import Path
 from handcal.calibration.delay import ASSUMED_LATENCY_S
 from handcal.camera.camera import Camera
 from handcal.camera.sdk_devices import Device, devices_by_child, explain_absence
-from handcal.core.errors import CancelledError, HandcalError
+from handcal.core.errors import CancelledError, HandcalError, extra_advice
 from handcal.core.progress import Progress
 from handcal.core.types import CameraIdentity, Intrinsics, Rig
 from handcal.hand.shipped import load_detector
@@ -231,7 +231,7 @@ def _camera_extras() -> list[Finding]:
     for extra, (module, camera) in CAMERA_EXTRAS.items():
         what = f"{camera} library"
         if importlib.util.find_spec(module) is None:
-            advice = f"needed for an {camera}: pip install 'handcal[{extra}]'"
+            advice = f"needed for an {camera}: {extra_advice(extra)}"
             findings.append(Finding(what, Health.LIMITED, f"{module} is not installed", advice))
         else:
             findings.append(Finding(what, Health.GOOD, f"{module} is installed"))

@@ -15,7 +15,7 @@ from handcal.camera.recording import check_recording
 from handcal.camera.recordings import RECORDING_SUFFIXES, open_recording
 from handcal.camera.ros import ros_recording
 from handcal.camera.sdk_devices import choose_device, devices_by_child, librealsense
-from handcal.core.errors import FileError, HandcalError, LinkError
+from handcal.core.errors import FileError, HandcalError, LinkError, extra_advice
 from handcal.core.progress import Progress
 from handcal.hand.settings import REACH_M
 from handcal.io.files import require_writable
@@ -122,8 +122,8 @@ def _camera(settings: StationSettings, progress: Progress) -> Finding:
         case "oak" | "orbbec" as kind:
             library, name = CAMERA_EXTRAS[kind]
             if find_spec(library) is None:
-                install = f"install it: pip install 'handcal[{kind}]'"
-                return _broken(f"the library of the {name}, {library}, is missing", install)
+                what = f"the library of the {name}, {library}, is missing"
+                return _broken(what, extra_advice(kind))
             which = f"{name} {settings.serial}".rstrip()
             return _limited(f"{which}, not tried yet", "it is opened when you start")
         case "recording":

@@ -404,7 +404,7 @@ def record_user_trials(
     Raises
     ------
     FileError
-        If a file cannot be used, or the session is not of a simulated wearer but `connect` is None.
+        If a file cannot be used, or `connect` is None and it is of no virtual headset.
     """
     record = Session.open(order.session)
     cube = Cube() if order.cube is None else read_cube(order.cube)
@@ -412,13 +412,13 @@ def record_user_trials(
     with ExitStack() as stack:
         camera: Camera
         if connect is None:
-            if "station" not in record.settings:
+            station = record.settings.get("station", {})
+            if station.get("headset") != "virtual" or "seed" not in station:
                 raise FileError(
-                    f"{order.session}: it is not of a simulated wearer",
-                    "make one with handcal demo",
+                    f"{order.session}: the virtual headset has no such wearer",
+                    "make a session with handcal demo",
                 )
-            seed = record.settings["station"].get("seed", 1)
-            server, bench = stack.enter_context(simulated_wearer(rig, cube, seed))
+            server, bench = stack.enter_context(simulated_wearer(rig, cube, station["seed"]))
             camera, leader = bench, StudyLeader(bench.place, bench.adjust)
         else:
             server = stack.enter_context(connect())

@@ -66,13 +66,13 @@ def test_one_final_shift_one_verdict_and_one_error(qtbot: QtBot, tmp_path: Path,
 
 
 def test_page_and_print_say_how_the_session_was_made(qtbot: QtBot) -> None:
-    record = Session.open(resource_path("example_session"))
-    station = {"source": "simulator", "headset": "virtual"}
-    simulated = replace(record, settings={**record.settings, "station": station})
+    simulated = Session.open(resource_path("example_session"))
     facts = session_facts(simulated)
     assert facts["Simulated"] == simulated.simulated == "camera, headset and wearer"
     assert facts["Method"] == "consistent"
-    assert "Simulated" not in session_facts(record)
+    station = {"source": "realsense", "headset": "network"}
+    real = replace(simulated, settings={**simulated.settings, "station": station})
+    assert "Simulated" not in session_facts(real)
     page = show(qtbot, ReviewPage(), 800, 900)
     page.show_session(simulated, None, 8.0)
     shown = {label.text() for label in page.findChildren(QLabel)}

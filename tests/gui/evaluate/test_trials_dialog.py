@@ -86,7 +86,8 @@ def test_the_study_leader_places_the_cube_and_moves_the_drawing(
 ) -> None:
     recorder = Recorder()
     dialog = make(recorder)
-    held = "The session of Simulated wearer holds 6 trials; new ones are added."
+    whose = "Simulated wearer (simulated: camera, headset and wearer)"
+    held = f"The session of {whose} holds 6 trials; new ones are added."
     assert part(dialog, QLabel, "trialsFound").text() == held
     instruction, follow = part(dialog, QLabel, "instruction"), part(dialog, QPushButton, "next")
     right, doing = part(dialog, QPushButton, "right"), part(dialog, QLabel, "doing")

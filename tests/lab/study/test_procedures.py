@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from handcal.cli.main import main
-from handcal.core.errors import HandcalError
 from handcal.core.types import EYES, DepthEdges, Eye
 from handcal.lab.settings import ProcedureStudySettings
 from handcal.lab.study.procedure_trial import ProcedureModel, lead_through
@@ -237,7 +236,7 @@ def test_the_figures_of_known_rows() -> None:
     [ProcedureStudySettings(plans=("spaam-3",)), ProcedureStudySettings(variants=("fast",))],
 )
 def test_unknown_plans_and_variants_are_refused(wrong: ProcedureStudySettings) -> None:
-    with pytest.raises(HandcalError, match="unknown"):
+    with pytest.raises(ValueError, match="unknown"):
         procedure_cases(wrong)
 
 

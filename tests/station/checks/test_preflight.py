@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import ifaddr  # noqa: F401 - at its first import it starts a process
 import numpy as np
 import pytest
 

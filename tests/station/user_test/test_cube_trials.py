@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.core.display import reprojection_error_px
 from handcal.core.errors import CameraEndError, FileError, HandcalError
 from handcal.core.geometry import transform
 from handcal.core.types import EYES, Eye, Float64, HeadsetIdentity, Intrinsics
@@ -30,7 +29,7 @@ from handcal.station.user_test.cube import (
     run_cube_tracking,
     run_user_trials,
 )
-from tests.helpers import ROOT
+from tests.helpers import ROOT, reprojection_error_px
 
 TRUE_M: dict[Eye, Float64] = {
     "left": np.array([0.002, 0.001, 0.003]),
