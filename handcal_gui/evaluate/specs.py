@@ -44,8 +44,8 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
             tr("Noise study"),
             tr(
                 "How much rotation and noise do the solvers tolerate before their error exceeds "
-                "the 4 mm of Hu et al. 2021? About a quarter of an hour on two cores; half a "
-                "minute for a quick run."
+                "the 4 mm of Hu et al. 2021? 55 minutes in one process beside other programs, "
+                "less in several; half a minute for a quick run."
             ),
             StudyEvaluation(noise_cases, run_noise_study),
             _noise_form,
