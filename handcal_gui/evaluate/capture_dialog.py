@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QGuiApplication, QKeyEvent
-from PySide6.QtWidgets import QCheckBox, QLineEdit, QWidget
+from PySide6.QtWidgets import QCheckBox, QWidget
 
 from handcal.camera.view_source import open_view_source
 from handcal.camera.viewpoint import ViewpointCamera, list_viewpoints
@@ -32,7 +32,7 @@ from handcal_gui.evaluate.entries import CubeEntries
 from handcal_gui.evaluate.evaluation_page import PreparationDialog
 from handcal_gui.widgets.action_strip import one_of_strips
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.fields import button, main_button, paragraph, whole_number, with_name
+from handcal_gui.widgets.fields import button, main_button, paragraph, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, vbox
@@ -46,7 +46,6 @@ _NOT_TURNED = tr("Along the camera's axes")
 _ELSEWHERE = tr("Close this window to choose the file under Camera intrinsics.")
 _BY_ITSELF = tr("A&utomatically")
 _NOT_BY_ITSELF = tr("Automatically: stored images do not wait")
-MOST_POSES = 100
 
 
 class CaptureDialog(PreparationDialog):
@@ -83,7 +82,7 @@ class CaptureDialog(PreparationDialog):
         self._plan_problem = ""
         self._looked_for: tuple[Cube, Grid] | None = None
         self._list_cameras = list_cameras
-        self.form = _plan_form()
+        self.form = EntriesForm(CubeEntries, ("positions", "poses", "drawn", "with_grid"))
         self.form.show_entries(entries)
         self._camera = LiveCameras((tr("Camera"),), open_source=open_source)
         self._list = Table("captures", tr("Images to take"), chooses="one")
@@ -382,36 +381,3 @@ class CaptureDialog(PreparationDialog):
             spacing=SPACING_PX,
         )
         self.resize(QGuiApplication.primaryScreen().availableSize().boundedTo(_FIRST_SIZE))
-
-
-def _plan_form() -> EntriesForm:
-    positions = with_name(
-        QLineEdit(),
-        "positions",
-        tr("Positions"),
-        tr("Positions of the camera in the eye box: names of folders, separated by commas."),
-    )
-    poses = whole_number("poses", 1, MOST_POSES, tr("Poses of the cube at each position."))
-    drawn = with_name(
-        QLineEdit(placeholderText=tr("One"), clearButtonEnabled=True),
-        "drawn",
-        tr("Renderings"),
-        tr("Names of the renderings to compare, such as: before, after."),
-    )
-    with_grid = with_name(
-        QCheckBox(tr("At &each position")),
-        "withGrid",
-        tr("Display's grid"),
-        tr(
-            "Without the grid, errors are measured along the camera's axes instead of the "
-            "display's."
-        ),
-    )
-    return EntriesForm(
-        {
-            "positions": (tr("&Positions"), positions),
-            "poses": (tr("Poses &at each"), poses),
-            "drawn": (tr("&Renderings"), drawn),
-            "with_grid": (tr("Display's grid"), with_grid),
-        }
-    )

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QStandardPaths
 
+from handcal.core.entry import CUBE_FILES, entry
 from handcal.lab.evaluate.cube_folder import CapturePlan
 from handcal.lab.settings import (
     CubeTestSettings,
@@ -14,7 +15,9 @@ from handcal.lab.settings import (
     NoiseStudySettings,
     SegmentationTestSettings,
     UserTestSettings,
+    results_folder,
 )
+from handcal_gui.app.translation import tr
 
 _PLAN = CapturePlan()
 
@@ -28,12 +31,34 @@ def _folder(name: str) -> str:
 class CubeEntries(CubeTestSettings):
     """Settings of the cube test, and the plan of its captures."""
 
-    positions: str = ", ".join(_PLAN.positions)
-    drawn: str = ", ".join(_PLAN.drawn)
+    positions: str = entry(
+        ", ".join(_PLAN.positions),
+        tr("&Positions"),
+        tr("Positions of the camera in the eye box: names of folders, separated by commas."),
+    )
+    drawn: str = entry(
+        ", ".join(_PLAN.drawn),
+        tr("&Renderings"),
+        tr("Names of the renderings to compare, such as: before, after."),
+        hint=tr("One"),
+    )
     """Names with commas between them, as of `CapturePlan`."""
-    with_grid: bool = _PLAN.with_grid
-    tracked_by: str = "network"
-    """``network``, ``camera`` or ``virtual``: what tracks the cube live."""
+    with_grid: bool = entry(
+        _PLAN.with_grid,
+        tr("Display's grid"),
+        tr("Without the grid, errors are measured along the camera's axes, not the display's."),
+        hint=tr("At &each position"),
+    )
+    tracked_by: str = entry(
+        "network",
+        tr("Tracked &by"),
+        tr("A headset draws the cube's edges where it stands in the room."),
+        options={
+            "network": tr("RealSense on a paired headset"),
+            "camera": tr("RealSense that does not move"),
+            "virtual": tr("Simulator"),
+        },
+    )
 
     @property
     def plan(self) -> CapturePlan:
@@ -45,12 +70,22 @@ class CubeEntries(CubeTestSettings):
 class UserEntries:
     """Settings of the user test: a folder of sessions, or a session."""
 
-    sessions: str = ""
-    output: str = field(default_factory=lambda: _folder("users"))
-    headset: str = "network"
-    """``network`` or ``virtual``: the headset of trials with a cube."""
-    cube: str = ""
-    """Description of that cube; empty for a 60 mm cube."""
+    sessions: str = entry(
+        "",
+        tr("&Sessions"),
+        tr("Folder of one session, or a folder that contains sessions."),
+        path="folder",
+    )
+    output: str = results_folder("")
+    headset: str = entry(
+        "network",
+        tr("&Headset"),
+        tr("The simulator needs a session of a simulated wearer, who adjusts φ."),
+        options={"network": tr("Paired headset, RealSense"), "virtual": tr("Simulator")},
+    )
+    """Of trials with a cube."""
+    cube: str = entry("", tr("C&ube"), hint=tr("60 mm cube"), path="file", files=CUBE_FILES)
+    """Description of that cube."""
 
     @property
     def settings(self) -> UserTestSettings:
@@ -69,7 +104,7 @@ class EvaluationEntries:
         default_factory=lambda: MethodComparisonSettings(output=_folder("methods"))
     )
     cube: CubeEntries = field(default_factory=lambda: CubeEntries(output=_folder("cube")))
-    users: UserEntries = field(default_factory=UserEntries)
+    users: UserEntries = field(default_factory=lambda: UserEntries(output=_folder("users")))
     segmentation: SegmentationTestSettings = field(
         default_factory=lambda: SegmentationTestSettings(output=_folder("segmentation"))
     )

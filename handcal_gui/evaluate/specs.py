@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-
-from PySide6.QtWidgets import QLineEdit, QSpinBox, QWidget
+from functools import partial
 
 from handcal.io.files import user_path
 from handcal.lab.evaluate.cube_folder import find_captures
@@ -13,7 +12,12 @@ from handcal.lab.evaluate.cube_test import run_cube_test
 from handcal.lab.evaluate.masked_frames import read_masked_names
 from handcal.lab.evaluate.segmentation import run_segmentation_test
 from handcal.lab.evaluate.user_test import holds_trials, run_user_test
-from handcal.lab.settings import SegmentationTestSettings
+from handcal.lab.settings import (
+    CubeTestSettings,
+    MethodComparisonSettings,
+    NoiseStudySettings,
+    SegmentationTestSettings,
+)
 from handcal.lab.study.studies import (
     method_cases,
     noise_cases,
@@ -23,18 +27,13 @@ from handcal.lab.study.studies import (
 from handcal.session.journal import JOURNAL
 from handcal.session.record import replay
 from handcal_gui.app.translation import tr
-from handcal_gui.evaluate.capture_dialog import MOST_POSES, CaptureDialog
+from handcal_gui.evaluate.capture_dialog import CaptureDialog
 from handcal_gui.evaluate.entries import CubeEntries, UserEntries
 from handcal_gui.evaluate.evaluation_page import EvaluationSpec, Preparation
 from handcal_gui.evaluate.track_dialog import TrackDialog
 from handcal_gui.evaluate.trials_dialog import TrialsDialog
 from handcal_gui.evaluate.work import FileEvaluation, StudyEvaluation
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.fields import choice, whole_number, with_name
-from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
-
-_MOST_WEARERS, _MOST_SEED, _MOST_PROCESSES = 10_000, 2**31 - 1, 1024
-_MOST_ALIGNMENTS = 20
 
 
 def make_specs() -> Mapping[str, EvaluationSpec]:
@@ -48,7 +47,7 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
                 "less in several; half a minute for a quick run."
             ),
             StudyEvaluation(noise_cases, run_noise_study),
-            _noise_form,
+            partial(EntriesForm, NoiseStudySettings),
             tr(
                 "The mean error of each solver over rotation and noise will be shown here, and up "
                 "to where it stays within 4 mm."
@@ -62,7 +61,7 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
                 "two cores."
             ),
             StudyEvaluation(method_cases, run_method_comparison),
-            _methods_form,
+            partial(EntriesForm, MethodComparisonSettings),
             tr("The errors and effort of each method will be shown here, beside published ones."),
         ),
         "cube": EvaluationSpec(
@@ -72,7 +71,7 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
                 "position? About a minute with rendered captures."
             ),
             FileEvaluation(_missing_captures, run_cube_test),
-            _cube_form,
+            partial(EntriesForm, CubeTestSettings),
             tr(
                 "How far the drawn cube is from the real one will be shown here, by axis and by "
                 "position of the camera."
@@ -104,7 +103,7 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
                 _missing_sessions,
                 lambda entries, progress: run_user_test(entries.settings, progress),
             ),
-            _users_form,
+            partial(EntriesForm, UserEntries, ("sessions", "output")),
             tr(
                 "The errors of all trials and of each wearer will be shown here, and where the "
                 "corners were drawn."
@@ -129,7 +128,7 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
                 "frames, and how stable is it? About a second per frame."
             ),
             FileEvaluation(_missing_frames, run_segmentation_test),
-            _segmentation_form,
+            partial(EntriesForm, SegmentationTestSettings),
             tr(
                 "How well each frame agrees with its mask will be shown here, with pictures of "
                 "where they differ."
@@ -190,126 +189,3 @@ def _missing_folder(folder: str, request: str) -> str:
     if not os.path.isdir(user_path(folder)):
         return tr("there is no folder {}: {}").format(folder, request)
     return ""
-
-
-def _noise_form() -> EntriesForm:
-    size = choice(
-        "size",
-        tr("Size"),
-        {"full": tr("Full"), "quick": tr("Quick")},
-        tr("A quick run uses few trials; do not report its numbers."),
-    )
-    return EntriesForm({"size": (tr("Si&ze"), size), **_study_fields()})
-
-
-def _methods_form() -> EntriesForm:
-    wearers = whole_number(
-        "wearers", 2, _MOST_WEARERS, tr("Simulated wearers; each uses every method.")
-    )
-    return EntriesForm({"wearers": (tr("&Wearers"), wearers), **_study_fields()})
-
-
-def _cube_form() -> EntriesForm:
-    captures = PathField(tr("Captures"), "folder", empty=tr("Rendered by the simulator"))
-    captures.setToolTip(tr("POSITION/POSE/real.png and virtual.png, and POSITION/grid.png."))
-    cube = PathField(tr("Cube"), "file", tr("Cubes (*.json)"), tr("cube.json of the captures"))
-    camera = PathField(tr("Camera"), "file", INTRINSICS_FILES, tr("camera.json of the captures"))
-    camera.setToolTip(tr("Intrinsics of the camera at the eye position."))
-    rig = PathField(tr("Rig file"), "file", tr("Rig files (*.yaml *.yml)"), tr("The example rig"))
-    square = whole_number(
-        "square", 20, 2000, tr("Side length of the squares of the display's grid.")
-    )
-    square.setSuffix(" px")
-    poses = whole_number(
-        "poses", 1, MOST_POSES, tr("Poses of the cube at each position, rendered or captured.")
-    )
-    alignments = whole_number(
-        "alignments",
-        1,
-        _MOST_ALIGNMENTS,
-        tr("Alignments at each position, if captures are rendered."),
-    )
-    return EntriesForm(
-        {
-            "captures": (tr("Ca&ptures"), captures),
-            "cube": (tr("C&ube"), cube),
-            "camera": (tr("Camera &intrinsics"), camera),
-            **_output(),
-            "rig": (tr("Ri&g file"), rig),
-            "eye": (
-                tr("&Display"),
-                choice(
-                    "eye",
-                    tr("Display"),
-                    {"left": tr("Left"), "right": tr("Right")},
-                    tr("The display in front of the camera."),
-                ),
-            ),
-            "square_px": (tr("Grid s&quares"), square),
-            "seed": (tr("&Seed of the rendering"), _seed()),
-            "poses": (tr("Poses &at each position"), poses),
-            "alignments": (tr("Align&ments per position"), alignments),
-        }
-    )
-
-
-def _users_form() -> EntriesForm:
-    sessions = PathField(tr("Sessions"), "folder")
-    sessions.setToolTip(tr("Folder of one session, or a folder that contains sessions."))
-    return EntriesForm({"sessions": (tr("&Sessions"), sessions), **_output()})
-
-
-def _segmentation_form() -> EntriesForm:
-    folder = PathField(tr("Frames"), "folder")
-    folder.setToolTip(tr("NAME_color.png, NAME_depth.png and NAME_handmask.png, and a meta.json."))
-    ways = {
-        "detector": tr("Where the detector sees one"),
-        "depth": tr("Nearest object, by depth alone"),
-    }
-    return EntriesForm(
-        {
-            "folder": (tr("Fra&mes"), folder),
-            "roi": (
-                tr("&Hand"),
-                choice("roi", tr("Hand"), ways, tr("Where the hand is looked for in a frame.")),
-            ),
-            **_output(),
-        }
-    )
-
-
-def _study_fields() -> dict[str, tuple[str, QWidget]]:
-    processes: QSpinBox = whole_number(
-        "processes",
-        0,
-        _MOST_PROCESSES,
-        tr("Number of processes on this computer; more than its cores is not faster."),
-    )
-    processes.setSpecialValueText(tr("One per core"))
-    processes.setMinimumWidth(processes.sizeHint().width())
-    scheduler = with_name(
-        QLineEdit(placeholderText=tr("None: this computer"), clearButtonEnabled=True),
-        "scheduler",
-        tr("Dask scheduler"),
-        tr("Address of a Dask cluster that does the work instead, such as tcp://HOST:PORT."),
-    )
-    return {
-        "seed": (tr("&Seed"), _seed()),
-        "processes": (tr("&Processes"), processes),
-        "scheduler": (tr("&Dask scheduler"), scheduler),
-        **_output(),
-    }
-
-
-def _seed() -> QSpinBox:
-    seed = whole_number(
-        "seed", 0, _MOST_SEED, tr("Random seed; the same seed gives the same numbers.")
-    )
-    seed.setMinimumWidth(seed.sizeHint().width())
-    return seed
-
-
-def _output() -> dict[str, tuple[str, QWidget]]:
-    output = PathField(tr("Results folder"), "folder")
-    output.setToolTip(tr("Report, figures and raw numbers; an unfinished study there is resumed."))
-    return {"output": (tr("Results fold&er"), output)}

@@ -30,7 +30,7 @@ from handcal_gui.evaluate.entries import CubeEntries
 from handcal_gui.evaluate.evaluation_page import PreparationDialog
 from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.fields import button, choice, main_button, one_of
+from handcal_gui.widgets.fields import button, main_button, one_of
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.job_bar import JobBar
@@ -72,23 +72,7 @@ class TrackDialog(PreparationDialog):
         self._track, self._pairing_problem = track, pairing_problem
         self._sight: CubeSight | None = None
         self._shown: CubeSight | None = None
-        self.form = EntriesForm(
-            {
-                "tracked_by": (
-                    tr("Tracked &by"),
-                    choice(
-                        "trackedBy",
-                        tr("Tracked by"),
-                        {
-                            "network": tr("RealSense on a paired headset"),
-                            "camera": tr("RealSense that does not move"),
-                            "virtual": tr("Simulator"),
-                        },
-                        tr("A headset draws the cube's edges where it stands in the room."),
-                    ),
-                ),
-            }
-        )
+        self.form = EntriesForm(CubeEntries, ("tracked_by",))
         self.form.show_entries(entries)
         self._view = ImageView(tr("Depth camera, colour"))
         self._view.setMinimumSize(56 * SPACING_PX, 32 * SPACING_PX)

@@ -28,12 +28,11 @@ from handcal_gui.evaluate.entries import UserEntries
 from handcal_gui.evaluate.evaluation_page import PreparationDialog
 from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.fields import button, choice, main_button, paragraph, with_name
+from handcal_gui.widgets.fields import button, main_button, paragraph, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
-from handcal_gui.widgets.path_field import PathField
 from handcal_gui.widgets.result_rows import EYE_NAMES
 from handcal_gui.widgets.table import Row, Table
 
@@ -144,23 +143,7 @@ class TrialsDialog(PreparationDialog):
         self._desk: _Desk | None = None
         self._step: _Step | None = None
         self._has_session, self._stored = False, ""
-        self.form = EntriesForm(
-            {
-                "headset": (
-                    tr("&Headset"),
-                    choice(
-                        "headset",
-                        tr("Headset"),
-                        {"network": tr("Paired headset, RealSense"), "virtual": tr("Simulator")},
-                        tr("The simulator needs a session of a simulated wearer, who adjusts φ."),
-                    ),
-                ),
-                "cube": (
-                    tr("C&ube"),
-                    PathField(tr("Cube"), "file", tr("Cubes (*.json)"), tr("60 mm cube")),
-                ),
-            }
-        )
+        self.form = EntriesForm(UserEntries, ("headset", "cube"))
         self.form.show_entries(entries)
         self._instruction = paragraph("instruction")
         self._found = FindingLine("trials")

@@ -22,6 +22,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from handcal.core.entry import RIG_FILES
 from handcal.core.errors import FileError, HandcalError
 from handcal.core.types import PART_NAMES, RIG_PARTS, Rig
 from handcal.io.files import user_path
@@ -52,7 +53,6 @@ from handcal_gui.widgets.sentence import sentence
 from handcal_gui.widgets.table import Table
 from handcal_gui.widgets.times import local_time
 
-_RIG_FILES = tr("Rig files (*.yaml *.yml)")
 _CHECKS = "docs/tutorial.md#7-check-depth-and-displays"
 _HOW = tr(
     "The depth and the displays are checked outside this window: "
@@ -96,7 +96,7 @@ class ResultPage(QWidget):
         self._how = make_linked(paragraph("howToCheck", _HOW.format(_CHECKS)))
         self._how.linkActivated.connect(read)
         self._numbers = Table("numbers-of-the-rig", tr("Numbers of the rig"))
-        self._other = PathField(tr("Rig file to compare with"), "file", _RIG_FILES)
+        self._other = PathField(tr("Rig file to compare with"), "file", RIG_FILES)
         self._differences = Table("differences", tr("Differences"))
         self._compared = FindingLine("compared")
         self._end = FindingLine("savedRig")
@@ -148,7 +148,7 @@ class ResultPage(QWidget):
         """Choose a path and save the rig file."""
         plain = re.sub(r"[^A-Za-z0-9]+", "-", self._name.text()).strip("-").lower()
         proposed = f"{plain or 'rig'}.yaml"
-        path = ask_save(self._project, self, tr("Save the rig file"), proposed, _RIG_FILES)
+        path = ask_save(self._project, self, tr("Save the rig file"), proposed, RIG_FILES)
         if path and self._confirm_mixed():
             self.save_as(path)
 

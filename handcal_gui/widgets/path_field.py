@@ -22,8 +22,6 @@ from handcal_gui.app.keys import native
 from handcal_gui.app.translation import tr
 from handcal_gui.widgets.fields import button, fill_row, plain_tooltip
 
-INTRINSICS_FILES = tr("Intrinsics (*.yaml *.yml *.xml *.json)")
-"""File filter for a camera's intrinsics."""
 _KEY = "F4"
 """Opens the dialog of the field that has the focus, as it opens a list."""
 

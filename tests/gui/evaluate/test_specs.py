@@ -33,7 +33,7 @@ def test_every_form_shows_and_returns_its_entries(qtbot: QtBot) -> None:
         NoiseStudySettings("quick", 3, 2, "tcp://host:1", "/n"),
         MethodComparisonSettings(12, 4, 3, "tcp://host:2", "/m"),
         CubeEntries(
-            *("/captures", "/cube.json", "/camera.json", "/rig.yaml", "right", 60, 5, "/c"),
+            *("/captures", "/cube.json", "/camera.json", "/c", "/rig.yaml", "right", 60, 5),
             poses=2,
             alignments=3,
         ),

@@ -120,7 +120,7 @@ def test_without_a_paired_headset_only_other_cameras_can_start(make: Make) -> No
     dialog = make("network", track_cube, "no headset is paired")
     assert not button(dialog, "start").isEnabled()
     assert finding(dialog).startswith("No headset is paired. Or choose something else")
-    chosen = child(dialog, QComboBox, "trackedBy")
+    chosen = child(dialog, QComboBox, "tracked_by")
     chosen.setCurrentIndex(chosen.findData("camera"))
     assert button(dialog, "start").isEnabled()
     assert not finding(dialog)

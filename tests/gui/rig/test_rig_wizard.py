@@ -266,7 +266,7 @@ def test_a_grid_that_has_no_room_is_reported(qtbot: QtBot, wizard: RigWizard) ->
     wizard.show_step(LEFT)
     wait(qtbot, wizard)
     show_tab(wizard, "Inputs")
-    square = child(wizard, QSpinBox, "gridSquare")
+    square = child(wizard, QSpinBox, "square_px")
     square.setValue(700)
     assert "no room" in child(wizard, QLabel, "imagesFound").text()
     show_tab(wizard, "Set-up")
