@@ -23,8 +23,7 @@ from handcal.lab.study.store import StudyFolder
 from handcal.lab.study.studies import noise_cases, run_method_comparison, run_noise_study
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
-from handcal_gui.evaluate.entries import CubeEntries, EvaluationEntries, UserEntries
-from handcal_gui.evaluate.specs import make_specs
+from handcal_gui.evaluate.entries import CubeEntries, EvaluationEntries, UserEntries, make_specs
 from handcal_gui.evaluate.work import StudyEvaluation
 
 
