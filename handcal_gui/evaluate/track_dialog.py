@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 from PySide6.QtCore import QPointF, QTimer
 from PySide6.QtGui import QColor, QPainter, QPen
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QDialog, QWidget
 from scipy.spatial.transform import Rotation
 
 from handcal.core.progress import Progress
@@ -27,7 +27,6 @@ from handcal_gui.app.theme import SPACING_PX, colors
 from handcal_gui.app.translation import tr
 from handcal_gui.evaluate.devices import depth_camera, paired_headset, pairing_problem
 from handcal_gui.evaluate.entries import CubeEntries
-from handcal_gui.evaluate.evaluation_page import PreparationDialog
 from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, main_button, one_of
@@ -46,7 +45,7 @@ _EDGES = tuple(
 Track: TypeAlias = Callable[..., CubeTracking]
 
 
-class TrackDialog(PreparationDialog):
+class TrackDialog(QDialog):
     """Shows the depth camera's image with the cube's edges, and the filtered pose beside it.
 
     Parameters

@@ -10,7 +10,7 @@ from functools import partial
 from typing import TypeAlias
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QGridLayout, QWidget
+from PySide6.QtWidgets import QDialog, QGridLayout, QWidget
 
 from handcal.core.errors import FileError
 from handcal.core.progress import Progress
@@ -25,7 +25,6 @@ from handcal_gui.app.theme import SPACING_PX, scale_font
 from handcal_gui.app.translation import tr
 from handcal_gui.evaluate.devices import depth_camera, paired_headset
 from handcal_gui.evaluate.entries import UserEntries
-from handcal_gui.evaluate.evaluation_page import PreparationDialog
 from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, main_button, paragraph, with_name
@@ -111,7 +110,7 @@ class _Desk:
                 continue
 
 
-class TrialsDialog(PreparationDialog):
+class TrialsDialog(QDialog):
     """Leads through the trials of one session: place the cube, adjust φ, for each eye.
 
     Parameters

@@ -8,17 +8,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtWidgets import QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QDialog, QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.lab.settings import NoiseStudySettings
 from handcal_gui.evaluate.entries import EvaluationEntries
-from handcal_gui.evaluate.evaluation_page import Preparation, PreparationDialog
+from handcal_gui.evaluate.evaluation_page import Preparation
 from handcal_gui.evaluate.window import EvaluationWindow
 from tests.gui.helpers import child
 
 
-class ScenarioDialog(PreparationDialog):
+class ScenarioDialog(QDialog):
     def __init__(self, entries: NoiseStudySettings, parent: QWidget) -> None:
         super().__init__(parent)
         self.entries = entries

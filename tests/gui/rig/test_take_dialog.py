@@ -197,7 +197,7 @@ def test_a_failing_camera_is_reported_and_can_be_shown_again(
 ) -> None:
     start(qtbot, dialog)
     cameras["1"].failure = CameraError("it was unplugged")
-    told = "It was unplugged. Press Show to open the cameras again."
+    told = "It was unplugged. Press Show to open the camera again."
     qtbot.waitUntil(lambda: said(dialog) == told)
     assert not button(dialog, "takeImage").isEnabled()
     start(qtbot, dialog)
@@ -249,7 +249,7 @@ def test_what_is_not_taken_by_itself_is_explained(
 def test_what_is_missing_is_said_and_nothing_can_be_shown_without_it(
     qtbot: QtBot, dialog: TakeDialog, cameras: dict[str, Any], tmp_path: Path
 ) -> None:
-    task, show = child(dialog, QLabel, "takeShow"), button(dialog, "startCameras")
+    task, show = child(dialog, QLabel, "takeTask"), button(dialog, "startCameras")
     source = dialog.findChildren(QComboBox, "source")[1]
     source.setCurrentIndex(source.findText("Recording or video"))
     assert task.text() == "Choose the recording or video of the headset camera."
@@ -258,7 +258,7 @@ def test_what_is_missing_is_said_and_nothing_can_be_shown_without_it(
     assert task.text() == "Both are the same camera: choose another for one of them."
     assert not show.isEnabled()
     source.setCurrentIndex(source.findText("Camera 1"))
-    assert task.text() == "Choose the cameras and press Show."
+    assert task.text() == "Choose a camera or a recording, and press Show."
     assert show.isEnabled()
 
 
