@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Hashable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
 from PySide6.QtCore import (
@@ -61,6 +61,8 @@ class Row:
     picture: Callable[[], QPixmap] | None = None
     picture_text: str = ""
     """Stands before the first cell, and says the same for screen readers."""
+    is_ticked: bool | None = None
+    """Of a box before the first cell; None if there is none."""
 
 
 class _Model(QAbstractTableModel):
@@ -72,6 +74,7 @@ class _Model(QAbstractTableModel):
         self.texts: list[tuple[str, ...]] = []
         self.hidden: list[int] = []
         self.order: tuple[int, Qt.SortOrder] | None = None
+        self.tick: Callable[[Any, bool], object] = lambda _key, _is_ticked: None
         self._font = number_font()
 
     def replace(self, columns: Sequence[Column], rows: Iterable[Row]) -> None:
@@ -115,6 +118,8 @@ class _Model(QAbstractTableModel):
                 return texts[place] if place < len(texts) else ""
             case Qt.ItemDataRole.DecorationRole if place == 0 and row.picture:
                 return row.picture()
+            case Qt.ItemDataRole.CheckStateRole if place == 0 and row.is_ticked is not None:
+                return Qt.CheckState.Checked if row.is_ticked else Qt.CheckState.Unchecked
             case Qt.ItemDataRole.AccessibleDescriptionRole if place == 0:
                 return row.picture_text
             case Qt.ItemDataRole.ToolTipRole:
@@ -128,6 +133,20 @@ class _Model(QAbstractTableModel):
             case Qt.ItemDataRole.TextAlignmentRole:
                 return self._alignment(place)
         return None
+
+    def flags(self, index: _Index) -> Qt.ItemFlag:
+        has_box = index.column() == 0 and self.rows[index.row()].is_ticked is not None
+        boxes = Qt.ItemFlag.ItemIsUserCheckable if has_box else Qt.ItemFlag.NoItemFlags
+        return super().flags(index) | boxes
+
+    def setData(self, index: _Index, value: Any, role: int = Qt.ItemDataRole.EditRole) -> bool:
+        if role != Qt.ItemDataRole.CheckStateRole:
+            return False
+        is_ticked = Qt.CheckState(value) == Qt.CheckState.Checked
+        row = self.rows[index.row()] = replace(self.rows[index.row()], is_ticked=is_ticked)
+        self.dataChanged.emit(index, index)
+        self.tick(row.key, is_ticked)
+        return True
 
     def _alignment(self, place: int) -> Qt.AlignmentFlag:
         if not self.columns[place].is_number:
@@ -291,6 +310,10 @@ class Table(QTableView):
             for i in self._model.hidden
         }
 
+    def offer_ticks(self, tick: Callable[[Any, bool], object]) -> None:
+        """Call `tick` with the key of a row whose box was ticked or not, and which of the two."""
+        self._model.tick = tick
+
     def offer_delete(self, delete: Callable[[Any], object]) -> None:
         """Call `delete` with the key of the chosen row when Del or the menu asks for it."""
         self.delete_action = add_action(
@@ -366,6 +389,8 @@ class Table(QTableView):
         text_px = font.horizontalAdvance(max(lines, key=len, default=""))
         if number == 0 and any(row.picture for row in self._model.rows):
             text_px += self.iconSize().width() + SPACING_PX
+        if number == 0 and any(row.is_ticked is not None for row in self._model.rows):
+            text_px += 3 * SPACING_PX
         title = self.horizontalHeader().fontMetrics()
         title_px = max(map(title.horizontalAdvance, column.title.split("\n")))
         arrow_px = 2 * SPACING_PX if self.isSortingEnabled() else 0

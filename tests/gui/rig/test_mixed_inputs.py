@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QMessageBox, QPushButton, QTabWidget, QTreeWidget
+from PySide6.QtWidgets import QLabel, QMessageBox, QPushButton, QTabWidget
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.rig.project_folder import ProjectFolder
 from handcal_gui.rig.step_page import StepPage
 from handcal_gui.rig.wizard import RigWizard
+from handcal_gui.widgets.table import Table
 from tests.gui.rig.wizard_steps import (
     LEFT,
     RESULT,
@@ -26,6 +26,7 @@ from tests.gui.rig.wizard_steps import (
     findings,
     marks,
     solve,
+    tick,
     wait,
 )
 
@@ -133,11 +134,11 @@ def test_an_image_unticked_makes_the_result_one_of_other_images(
 ) -> None:
     wizard.show_step(STEREO)
     wait(qtbot, wizard)
-    shots = child(wizard, QTreeWidget, "shots")
+    shots = child(wizard, Table, "shots")
     child(wizard, QPushButton, "solve").click()
     if not is_solving:
         wait(qtbot, wizard)
-    shots.topLevelItem(1).setCheckState(0, Qt.CheckState.Unchecked)
+    tick(shots, 1, False)
     wait(qtbot, wizard)
     text = "olved with other inputs (excluded images): solve it again"
     assert child(wizard, QLabel, "verdictFound").text() == f"S{text}."

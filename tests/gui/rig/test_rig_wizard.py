@@ -18,7 +18,6 @@ from PySide6.QtWidgets import (
     QListWidget,
     QPushButton,
     QSpinBox,
-    QTreeWidget,
 )
 from pytestqt.qtbot import QtBot
 
@@ -34,6 +33,7 @@ from handcal_gui.rig.take_dialog import TakeDialog
 from handcal_gui.rig.wizard import RigWizard
 from handcal_gui.widgets.fields import MainButton
 from handcal_gui.widgets.job_bar import JobBar
+from handcal_gui.widgets.table import Table
 from tests.gui.helpers import letters
 from tests.gui.rig.wizard_steps import (
     BOARDS,
@@ -47,6 +47,7 @@ from tests.gui.rig.wizard_steps import (
     marks,
     show_tab,
     solve,
+    tick,
     wait,
 )
 
@@ -88,14 +89,14 @@ def test_an_image_is_dropped_and_taken_in_again(
     qtbot: QtBot, wizard: RigWizard, folder: Path
 ) -> None:
     assert "8 pairs" in solve(qtbot, wizard, STEREO)
-    item = child(wizard, QTreeWidget, "shots").topLevelItem(1)
-    item.setCheckState(0, Qt.CheckState.Unchecked)
+    shots = child(wizard, Table, "shots")
+    tick(shots, 1, False)
     assert "7 pairs" in solve(qtbot, wizard, STEREO)
     assert wizard.project.rig.origins["T_H_D"].views == 7
     wizard.accept()
     assert ProjectFolder(folder).load()[0].stereo.dropped == ("depth-002.png",)
     wizard.show()
-    item.setCheckState(0, Qt.CheckState.Checked)
+    tick(shots, 1, True)
     assert "8 pairs" in solve(qtbot, wizard, STEREO)
 
 
@@ -152,7 +153,7 @@ def test_another_board_is_searched_for_again(qtbot: QtBot, wizard: RigWizard) ->
     wait(qtbot, wizard)
     assert all(shot.problem for shot in page.panels[0].shots)
     assert "found in no image" in child(wizard, QLabel, "verdictFound").text()
-    assert child(wizard, QTreeWidget, "shots").topLevelItemCount() == 8
+    assert len(child(wizard, Table, "shots").keys) == 8
 
 
 def test_the_grid_is_saved(
@@ -323,9 +324,9 @@ def test_without_the_poses_of_the_board_nothing_is_solved(qtbot: QtBot, wizard: 
 
 def test_without_a_ticked_image_nothing_is_solved(qtbot: QtBot, wizard: RigWizard) -> None:
     assert "added" in solve(qtbot, wizard, STEREO)
-    shots = child(wizard, QTreeWidget, "shots")
-    for row in range(shots.topLevelItemCount()):
-        shots.topLevelItem(row).setCheckState(0, Qt.CheckState.Unchecked)
+    shots = child(wizard, Table, "shots")
+    for row in range(len(shots.keys)):
+        tick(shots, row, False)
     assert not child(wizard, QPushButton, "solve").isEnabled()
     assert "tick an image" in child(wizard, QLabel, "verdictFound").text()
 

@@ -5,11 +5,20 @@ from __future__ import annotations
 from typing import Any
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QListWidget, QPushButton, QTableWidget, QTabWidget, QWidget
+from PySide6.QtWidgets import (
+    QLabel,
+    QListWidget,
+    QPushButton,
+    QTableView,
+    QTableWidget,
+    QTabWidget,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.rig.wizard import RigWizard
 from handcal_gui.widgets.job_bar import JobBar
+from handcal_gui.widgets.table import Table
 
 BOARDS, STEREO, VIEWPOINT, LEFT, RIGHT, RESULT = range(6)
 
@@ -38,6 +47,18 @@ def show_tab(wizard: RigWizard, title: str) -> None:
     tabs = child(wizard, QTabWidget, "")
     (place,) = (i for i in range(tabs.count()) if tabs.tabText(i).replace("&", "") == title)
     tabs.setCurrentIndex(place)
+
+
+def cell(parent: QWidget, row: int, column: int) -> str:
+    """Return the text of a cell of the list of images."""
+    model = parent.findChildren(Table, "shots")[0].model()
+    return str(model.index(row, column).data())
+
+
+def tick(table: QTableView, row: int, is_ticked: bool) -> None:
+    """Tick the box of an image, or untick it."""
+    state = Qt.CheckState.Checked if is_ticked else Qt.CheckState.Unchecked
+    table.model().setData(table.model().index(row, 0), state, Qt.ItemDataRole.CheckStateRole)
 
 
 def findings(page: QWidget) -> dict[str, tuple[str, str]]:
