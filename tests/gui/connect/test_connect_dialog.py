@@ -11,11 +11,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QCheckBox,
+    QInputDialog,
     QLabel,
     QMessageBox,
     QPushButton,
-    QTableWidget,
-    QTableWidgetItem,
 )
 from pytestqt.qtbot import QtBot
 
@@ -25,8 +24,8 @@ from handcal.link.exchange import pair_by_code
 from handcal.link.invitation import read_invitation
 from handcal.link.pairing import Pairings
 from handcal.link.server import HeadsetServer, PairingAttempts
-from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.connect.connect_dialog import ConnectDialog, QrCode
+from handcal_gui.widgets.table import Table
 from tests.gui.helpers import child, text
 
 DEVICE = "00000000000000aa"
@@ -74,12 +73,6 @@ def button(dialog: ConnectDialog, name: str) -> QPushButton:
     return child(dialog, QPushButton, name)
 
 
-def cell(table: QTableWidget, row: int, column: int) -> QTableWidgetItem:
-    found = table.item(row, column)
-    assert found is not None
-    return found
-
-
 def eye_of_square(client: HeadsetClient) -> str:
     target = client.state().target
     return "" if target is None else target.eye
@@ -92,16 +85,6 @@ def test_nothing_is_ticked_before_a_headset_has_connected(dialog: ConnectDialog)
     assert not child(dialog, QCheckBox, "squareSeen-left").isEnabled()
     assert len(text(dialog, "digits").replace(" ", "")) == 8
     assert child(dialog, QrCode).accessibleDescription().startswith("HANDCAL://")
-
-
-def test_the_empty_list_says_that_paired_headsets_appear_there(dialog: ConnectDialog) -> None:
-    heading = next(one for one in dialog.findChildren(QLabel) if one.text() == "Paired headsets")
-    empty = child(dialog, QLabel, "noDevices")
-    assert empty.isVisible()
-    assert "appear here once" in empty.text()
-    between_px = empty.mapTo(dialog, empty.rect().topLeft()).y() - heading.geometry().bottom()
-    assert 0 < between_px <= 2 * SPACING_PX
-    assert empty.alignment() & Qt.AlignmentFlag.AlignTop
 
 
 def test_enter_keeps_the_code_that_is_being_typed(dialog: ConnectDialog) -> None:
@@ -145,8 +128,7 @@ def test_a_headset_pairs_by_the_code_once(
     assert "Runtime 3" in found
     assert "App 1.2" in found
     assert "It sends no poses" in found
-    table = child(dialog, QTableWidget, "pairedDevices")
-    assert cell(table, 0, 1).text() == f"{DEVICE}, connected"
+    assert f"{DEVICE}, connected" in child(dialog, Table, "pairedDevices").as_text()
     button(dialog, "invite").click()
     assert child(dialog, QrCode).accessibleDescription().startswith("HANDCAL://")
 
@@ -186,18 +168,21 @@ def test_a_headset_is_renamed_and_revoked(
 ) -> None:
     client, _ = connect()
     dialog.refresh()
-    table = child(dialog, QTableWidget, "pairedDevices")
-    cell(table, 0, 0).setText("Ward 3")
-    assert [one.name for one in pairings.all] == ["Ward 3"]
-    cell(table, 0, 0).setText("x" * 41)
-    assert "at most 40 characters" in text(dialog, "connectProblem")
-    assert cell(table, 0, 0).text() == "Ward 3"
+    table = child(dialog, Table, "pairedDevices")
     table.selectRow(0)
+    for typed, said in (("Ward 3", ""), ("x" * 41, "at most 40 characters")):
+        monkeypatch.setattr(QInputDialog, "getText", lambda *_, name=typed, **__: (name, True))
+        button(dialog, "renameDevice").click()
+        assert [one.name for one in pairings.all] == ["Ward 3"]
+        assert said in text(dialog, "connectProblem")
+        assert "Ward 3" in table.as_text()
+        assert len(table.chosen) == 1
     monkeypatch.setattr(QMessageBox, "question", lambda *_: QMessageBox.StandardButton.No)
     button(dialog, "revokeDevice").click()
     assert pairings.all
     monkeypatch.setattr(QMessageBox, "question", lambda *_: QMessageBox.StandardButton.Yes)
     button(dialog, "revokeDevice").click()
     assert pairings.all == ()
-    assert table.isHidden()
+    assert "appear here once" in text(dialog, "pairedDevices-empty")
+    assert not button(dialog, "renameDevice").isEnabled()
     qtbot.waitUntil(lambda: not client.connected, timeout=PATIENCE_MS)
