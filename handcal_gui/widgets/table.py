@@ -188,6 +188,8 @@ class Table(QTableView):
         How many rows can be selected. With *several*, one always is, as long as there are any.
     is_sorted : bool
         A click on a heading sorts by it, and F6 by the next column (Shift+F6: in reverse).
+    wraps : bool
+        Long texts have several lines instead of being cut.
 
     Attributes
     ----------
@@ -210,6 +212,7 @@ class Table(QTableView):
         chooses: Literal["none", "one", "several"] = "none",
         *,
         is_sorted: bool = False,
+        wraps: bool = False,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -230,7 +233,9 @@ class Table(QTableView):
         )
         self.setHorizontalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
         self.setTabKeyNavigation(False)
-        self.setWordWrap(False)
+        self.setWordWrap(wraps)
+        if wraps:
+            self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.setShowGrid(False)
         self.setAlternatingRowColors(True)
         self.verticalHeader().hide()

@@ -69,10 +69,6 @@ def connect(
         client.close()
 
 
-def button(dialog: ConnectDialog, name: str) -> QPushButton:
-    return child(dialog, QPushButton, name)
-
-
 def eye_of_square(client: HeadsetClient) -> str:
     target = client.state().target
     return "" if target is None else target.eye
@@ -81,7 +77,7 @@ def eye_of_square(client: HeadsetClient) -> str:
 def test_nothing_is_ticked_before_a_headset_has_connected(dialog: ConnectDialog) -> None:
     assert text(dialog, "headsetFound").startswith("No headset is connected yet")
     assert child(dialog, QLabel, "headsetHealth").accessibleName() == "Note"
-    assert not button(dialog, "square-left").isEnabled()
+    assert not child(dialog, QPushButton, "square-left").isEnabled()
     assert not child(dialog, QCheckBox, "squareSeen-left").isEnabled()
     assert len(text(dialog, "digits").replace(" ", "")) == 8
     assert child(dialog, QrCode).accessibleDescription().startswith("HANDCAL://")
@@ -90,7 +86,7 @@ def test_nothing_is_ticked_before_a_headset_has_connected(dialog: ConnectDialog)
 def test_enter_keeps_the_code_that_is_being_typed(dialog: ConnectDialog) -> None:
     code = text(dialog, "digits")
     focused = dialog.focusWidget()
-    assert focused is button(dialog, "close")
+    assert focused is child(dialog, QPushButton, "close")
     QTest.keyClick(focused, Qt.Key.Key_Return)
     assert not dialog.isVisible()
     assert text(dialog, "digits") == code
@@ -129,7 +125,7 @@ def test_a_headset_pairs_by_the_code_once(
     assert "App 1.2" in found
     assert "It sends no poses" in found
     assert f"{DEVICE}, connected" in child(dialog, Table, "pairedDevices").as_text()
-    button(dialog, "invite").click()
+    child(dialog, QPushButton, "invite").click()
     assert child(dialog, QrCode).accessibleDescription().startswith("HANDCAL://")
 
 
@@ -141,7 +137,7 @@ def test_the_square_is_acknowledged_before_it_can_be_seen(
 ) -> None:
     client, _ = connect()
     dialog.refresh()
-    button(dialog, "square-right").click()
+    child(dialog, QPushButton, "square-right").click()
     seen = child(dialog, QCheckBox, "squareSeen-right")
     qtbot.waitUntil(seen.isEnabled, timeout=PATIENCE_MS)
     assert text(dialog, "squareState-right") == "acknowledged by the headset"
@@ -152,7 +148,7 @@ def test_the_square_is_acknowledged_before_it_can_be_seen(
     assert np.ptp(target.corners_V_m[:, 0]) == pytest.approx(0.08, abs=1e-6)
     assert set(client.state().projections) == {"right"}
     seen.setChecked(True)
-    button(dialog, "square-left").click()
+    child(dialog, QPushButton, "square-left").click()
     qtbot.waitUntil(lambda: eye_of_square(client) == "left", timeout=PATIENCE_MS)
     assert seen.isChecked()  # the wearer's word stays
     client.close()
@@ -172,17 +168,17 @@ def test_a_headset_is_renamed_and_revoked(
     table.selectRow(0)
     for typed, said in (("Ward 3", ""), ("x" * 41, "at most 40 characters")):
         monkeypatch.setattr(QInputDialog, "getText", lambda *_, name=typed, **__: (name, True))
-        button(dialog, "renameDevice").click()
+        child(dialog, QPushButton, "renameDevice").click()
         assert [one.name for one in pairings.all] == ["Ward 3"]
         assert said in text(dialog, "connectProblem")
         assert "Ward 3" in table.as_text()
         assert len(table.chosen) == 1
     monkeypatch.setattr(QMessageBox, "question", lambda *_: QMessageBox.StandardButton.No)
-    button(dialog, "revokeDevice").click()
+    child(dialog, QPushButton, "revokeDevice").click()
     assert pairings.all
     monkeypatch.setattr(QMessageBox, "question", lambda *_: QMessageBox.StandardButton.Yes)
-    button(dialog, "revokeDevice").click()
+    child(dialog, QPushButton, "revokeDevice").click()
     assert pairings.all == ()
     assert "appear here once" in text(dialog, "pairedDevices-empty")
-    assert not button(dialog, "renameDevice").isEnabled()
+    assert not child(dialog, QPushButton, "renameDevice").isEnabled()
     qtbot.waitUntil(lambda: not client.connected, timeout=PATIENCE_MS)

@@ -12,7 +12,6 @@ from PySide6.QtWidgets import (
     QComboBox,
     QLabel,
     QPushButton,
-    QWidget,
 )
 from pytestqt.qtbot import QtBot
 
@@ -27,10 +26,9 @@ from handcal_gui.rig.maps import CoverageMap, UncertaintyMap
 from handcal_gui.rig.project import RigProject
 from handcal_gui.rig.project_folder import ProjectFolder
 from handcal_gui.rig.solve import SolvedPart
-from handcal_gui.widgets.drawing import Drawing
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.table import Table
-from tests.gui.helpers import child
+from tests.gui.helpers import child, text
 from tests.gui.rig.wizard_steps import cell, tick
 
 PAGES = "setup-stereo", "setup-viewpoint", "setup-display", "setup-board"
@@ -68,12 +66,6 @@ def look(panel: ImagesPanel, photographs: Any, dropped: tuple[str, ...] = ()) ->
 
 def captions(panel: ImagesPanel) -> list[QLabel]:
     return panel.findChildren(QLabel, "shotCaption")
-
-
-def text(panel: QWidget, name: str) -> str:
-    label = panel.findChild(QLabel, name)
-    assert isinstance(label, QLabel)
-    return label.text()
 
 
 def test_an_image_is_shown_although_the_other_of_its_pair_cannot_be_read(
@@ -205,13 +197,6 @@ def test_what_was_left_out_of_other_images_is_forgotten(
     assert full.dropped_of(before) == ()
 
 
-@pytest.mark.parametrize("page", sorted(PAGES))
-def test_every_step_has_a_drawing(qtbot: QtBot, page: str) -> None:
-    drawing = Drawing(f"docs/pictures/{page}.svg")
-    qtbot.addWidget(drawing)
-    assert drawing.is_readable
-
-
 def test_the_uncertainty_of_a_solved_camera_is_shown(qtbot: QtBot, panel: ImagesPanel) -> None:
     sigma_px = np.full((9, 12), 0.1)
     sigma_px[0, 0], sigma_px[0, 1] = 2.0, np.nan
@@ -219,8 +204,7 @@ def test_the_uncertainty_of_a_solved_camera_is_shown(qtbot: QtBot, panel: Images
     panel.show_solved(
         SolvedPart(CalibrationVerdict("good", ""), (), {}, uncertainties=(found, None))
     )
-    shown_map = panel.findChild(QComboBox, "map")
-    assert isinstance(shown_map, QComboBox)
+    shown_map = child(panel, QComboBox, "map")
     shown_map.setCurrentIndex(1)
     maps = panel.findChildren(UncertaintyMap)
     assert [one.caption for one in maps] == ["Depth camera: ± 0.10, 0.90 px", "Headset camera: –"]

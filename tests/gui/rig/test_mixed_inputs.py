@@ -14,7 +14,6 @@ from PySide6.QtWidgets import QLabel, QMessageBox, QPushButton, QTabWidget
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.rig.project_folder import ProjectFolder
-from handcal_gui.rig.step_page import StepPage
 from handcal_gui.rig.wizard import RigWizard
 from handcal_gui.widgets.table import Table
 from tests.gui.rig.wizard_steps import (
@@ -25,16 +24,11 @@ from tests.gui.rig.wizard_steps import (
     child,
     findings,
     marks,
+    page_of,
     solve,
     tick,
     wait,
 )
-
-
-def page_of(wizard: RigWizard) -> StepPage:
-    page = wizard.page
-    assert isinstance(page, StepPage)
-    return page
 
 
 def test_another_board_makes_every_solved_step_outdated(

@@ -32,8 +32,7 @@ def program(qtbot: QtBot, tmp_path: Path) -> Iterator[Program]:
 
 
 def test_the_start_page_leads_to_a_rig_that_it_uses(program: Program, tmp_path: Path) -> None:
-    button = program.start.findChild(QPushButton, "calibrateRig")
-    assert isinstance(button, QPushButton)
+    button = child(program.start, QPushButton, "calibrateRig")
     button.click()
     (wizard,) = program.window.findChildren(RigWizard)
     assert wizard.isVisible()
@@ -52,8 +51,7 @@ def test_the_start_page_leads_to_a_rig_that_it_uses(program: Program, tmp_path: 
 def test_the_rig_is_named_as_soon_as_the_wizard_is_closed(
     qtbot: QtBot, program: Program, tmp_path: Path
 ) -> None:
-    found = program.window.findChild(QLabel, "rigFound")
-    assert isinstance(found, QLabel)
+    found = child(program.window, QLabel, "rigFound")
     qtbot.waitUntil(lambda: "Example" in found.text())
     wizard = program.windows.calibrate_rig()
     assert wizard is not None
