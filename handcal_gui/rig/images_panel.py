@@ -96,7 +96,7 @@ class ImagesPanel(QWidget):
         self._question: tuple[tuple[Path, ...], Board] | None = None
         self._dropped: frozenset[str] = frozenset()
         self._list = Table("shots", tr("Images"), chooses="one")
-        self._list.setIconSize(QSize(6 * SPACING_PX, 4 * SPACING_PX))
+        self._list.setIconSize(_PICTURE_PX)
         self._list.setMinimumSize(34 * SPACING_PX, 12 * SPACING_PX)
         self._list.offer_ticks(self._tick)
         self._view = ShotView(titles)
@@ -271,6 +271,7 @@ class ImagesPanel(QWidget):
         split.addWidget(self._list)
         split.addWidget(self._view)
         split.setStretchFactor(1, 1)
+        split.setSizes([60 * SPACING_PX, 40 * SPACING_PX])
         hbox((split, 1), side, on=self, margins=SPACING_PX, spacing=2 * SPACING_PX)
         buttons = self.take, self.again
         self._button_row = hbox(*buttons, 1, on=self.buttons, margins=0, spacing=SPACING_PX)
@@ -319,22 +320,26 @@ _SHOWN: dict[Column, Callable[[Shot, SolvedPart], str]] = {
         tr("Root mean square distance between detected and expected corners, after solving."),
     ): _rms,
     Column(
-        tr("Tilt"), tr("Angle between the board's normal and the line of sight, after solving.")
+        tr("Tilt"),
+        tr("Angle between the board's normal and the line of sight, after solving."),
     ): _tilt,
     Column(
         tr("Note"),
         tr("Why no board was found, or what is wrong with the worst image."),
         is_number=False,
+        is_rest=True,
     ): _note,
 }
 """The columns of the list of images, with the text of each image."""
+_PICTURE_PX = QSize(6 * SPACING_PX, 4 * SPACING_PX)
 _UNSOLVED = SolvedPart(CalibrationVerdict("bad", ""), (), {})
 
 
 def _picture(image: UInt8) -> QPixmap:
     height, width = image.shape[:2]
     shown = QImage(image.data, width, height, 3 * width, QImage.Format.Format_RGB888)
-    return QPixmap.fromImage(shown.copy())
+    keep, smooth = Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
+    return QPixmap.fromImage(shown.copy()).scaled(_PICTURE_PX, keep, smooth)
 
 
 _ARM = 0.006  # of a corner's cross, relative to the image's width

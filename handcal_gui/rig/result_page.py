@@ -167,7 +167,12 @@ class ResultPage(QWidget):
         """Show the findings: failed and doubtful ones come first, then what is not known."""
         shown = sorted(self._shown, key=lambda one: (not one.has_failed, one.is_fine, one.is_known))
         is_fine = all(one.is_fine for one in shown)
-        columns = (tr("Item"), tr("Found"), *(() if is_fine else (tr("Expected"),)))
+        expected = () if is_fine else (Column(tr("Expected"), is_number=False),)
+        columns = (
+            Column(tr("Item"), is_number=False),
+            Column(tr("Found"), is_number=False, is_rest=True),
+            *expected,
+        )
         rows = []
         for one in shown:
             found = _TIME.sub(lambda time: local_time(time[0]), one.found)
@@ -178,7 +183,7 @@ class ResultPage(QWidget):
             picture = partial(_picture, sign, shade) if sign else None
             row = Row("", tuple(cells[: len(columns)]), picture=picture, picture_text=word)
             rows.append(row)
-        self._findings.show_rows([Column(one, is_number=False) for one in columns], rows)
+        self._findings.show_rows(columns, rows)
 
     def _outdated(self) -> list[RigFinding]:
         """Return the steps that were solved with other inputs than the present ones."""

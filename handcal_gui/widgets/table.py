@@ -43,6 +43,8 @@ class Column:
     is_number: bool = True
     rank: int = 0
     """Columns of the highest rank are left out first if not all fit; those of rank 0 never."""
+    is_rest: bool = False
+    """It takes all the room that the others leave, be it more or less than its texts need."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -373,9 +375,11 @@ class Table(QTableView):
             if columns[number].rank and sum(wanted_px[one] for one in shown) > room_px:
                 shown.remove(number)
         spare_px = max(0, room_px - sum(wanted_px[number] for number in shown))
+        rest = [number for number in shown if columns[number].is_rest] or shown
         for number in range(len(columns)):
             self.setColumnHidden(number, number not in shown)
-            self.setColumnWidth(number, wanted_px[number] + spare_px // len(shown))
+            more_px = spare_px // len(rest) if number in rest else 0
+            self.setColumnWidth(number, wanted_px[number] + more_px)
         hidden = [number for number in range(len(columns)) if number not in shown]
         if hidden != self._model.hidden:
             self._model.hidden = hidden
@@ -399,7 +403,8 @@ class Table(QTableView):
         title = self.horizontalHeader().fontMetrics()
         title_px = max(map(title.horizontalAdvance, column.title.split("\n")))
         arrow_px = 2 * SPACING_PX if self.isSortingEnabled() else 0
-        return min(max(text_px, title_px + arrow_px), _MOST_PX) + 2 * SPACING_PX
+        needed_px = 0 if column.is_rest else text_px
+        return min(max(needed_px, title_px + arrow_px), _MOST_PX) + 2 * SPACING_PX
 
     def _note_chosen(self) -> None:
         if self.delete_action is not None:
