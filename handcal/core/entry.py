@@ -1,4 +1,4 @@
-"""What a form says of a field of a settings dataclass, kept beside the field's type and default."""
+"""Words and limits of a form's field, kept beside the type and default in a settings dataclass."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ Value = TypeVar("Value", bound=bool | int | float | str)
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """How a field is entered; its type and the end of its name, the unit, say the rest."""
+    """Words and limits of a field; its type, and the unit at the end of its name, say the rest."""
 
     label: str
     """With & before the letter that leads to it."""
     help: str = ""
     hint: str = ""
-    """What an empty text, or the lowest number, stands for; of a bool, the text beside the box."""
+    """Meaning of an empty text, or of the lowest number; of a bool, the text beside the box."""
     limits: tuple[float, float] = (0, 0)
     """Of a number, both included."""
     options: Mapping[str, str] | None = None

@@ -39,7 +39,7 @@ class Table:
     rows: Sequence[Sequence[str]]
     caption: str = ""
     name: str = ""
-    """What tells it from the other tables of its section; not in the report."""
+    """Tells it from the other tables of its section; not in the report."""
 
 
 @dataclass(frozen=True, slots=True)

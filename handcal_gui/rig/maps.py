@@ -50,7 +50,7 @@ class CellMap(QWidget):
         return QSize(_WIDTH_PX + 1, _HEIGHT_PX + HEAD_PX + 1)
 
     def show_cells(self, told: str, shades: Float64, texts: Sequence[Sequence[str]]) -> None:
-        """Show the title and what is told above the cells.
+        """Show the title and a text above the cells.
 
         Parameters
         ----------

@@ -32,8 +32,7 @@ def program(qtbot: QtBot, tmp_path: Path) -> Iterator[Program]:
 
 
 def test_the_start_page_leads_to_a_rig_that_it_uses(program: Program, tmp_path: Path) -> None:
-    button = child(program.start, QPushButton, "calibrateRig")
-    button.click()
+    program.start.new.form.calibrate_rig.click()
     (wizard,) = program.window.findChildren(RigWizard)
     assert wizard.isVisible()
     assert (tmp_path / "config" / "rig").is_dir()
@@ -51,7 +50,7 @@ def test_the_start_page_leads_to_a_rig_that_it_uses(program: Program, tmp_path: 
 def test_the_rig_is_named_as_soon_as_the_wizard_is_closed(
     qtbot: QtBot, program: Program, tmp_path: Path
 ) -> None:
-    found = child(program.window, QLabel, "rigFound")
+    [found] = program.window.findChildren(QLabel, "rigFound")
     qtbot.waitUntil(lambda: "Example" in found.text())
     wizard = program.windows.calibrate_rig()
     assert wizard is not None

@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
-    QApplication,
     QCheckBox,
     QComboBox,
     QLabel,
@@ -32,7 +31,6 @@ from handcal_gui.rig.step_page import StepPage
 from handcal_gui.rig.take_dialog import TakeDialog
 from handcal_gui.rig.wizard import RigWizard
 from handcal_gui.widgets.fields import MainButton
-from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.path_field import PathField
 from tests.gui.helpers import child, text
 from tests.gui.rig.wizard_steps import STEREO, wait
@@ -121,15 +119,6 @@ def test_what_is_taken_is_counted_and_what_it_covers_is_shown_at_once(
     qtbot.waitUntil(lambda: "Take another" in text(dialog, "takenFound"))
     assert count() == "1 of 20 usable pairs of images", "the headset camera's shows no board"
     assert [one.caption for one in maps] == covered
-    dialog.resize(952, 492)  # as on a screen of 960x540, with the window's frame
-    QApplication.processEvents()
-    assert (dialog.width(), dialog.height()) == (952, 492)
-    assert all(one.height() >= 220 for one in dialog.findChildren(ImageView)), "to judge sharpness"
-    foot_px = child(dialog, QPushButton, "takeImage").mapTo(dialog, QPoint()).y()
-    for one in maps:
-        assert one.isVisible()
-        assert dialog.rect().contains(one.geometry())
-        assert one.geometry().bottom() < foot_px
 
 
 def test_earlier_images_count(qtbot: QtBot, wizard: RigWizard, photographs: Any) -> None:

@@ -66,13 +66,11 @@ def test_the_lead_says_how_far_each_method_keeps_the_line(report: Report) -> Non
 @pytest.mark.parametrize(
     ("errors_mm", "reach"), [((5.0, 5.0), "at no rotation"), ((3.0, 5.0), "only at 0°")]
 )
-def test_a_failure_at_0_is_told_from_one_at_the_next_angle(
+def test_a_failure_at_0_differs_from_one_at_the_next_angle(
     errors_mm: tuple[float, float], reach: str
 ) -> None:
     errors = zip((0.0, 5.0), errors_mm, strict=True)
-    rows = [
-        made("rotation", angle, method, 0, mm) for angle, mm in errors for method in SLOPES_MM
-    ]
+    rows = [made("rotation", angle, method, 0, mm) for angle, mm in errors for method in SLOPES_MM]
     report = noise_report(SETTINGS, rows)
     assert f"within 4 mm {reach}, and" in report.lead
     found = {row[0]: row[2] for row in table(report, "The paper's findings and these")}
