@@ -38,6 +38,8 @@ class Table:
     columns: Sequence[Column]
     rows: Sequence[Sequence[str]]
     caption: str = ""
+    name: str = ""
+    """Tells it from the other tables of its section; not in the report."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,7 +39,7 @@ from handcal_gui.calibrate.start.start_page import StartPage
 from handcal_gui.calibrate.window import MainWindow
 from handcal_gui.connect.connect_dialog import ConnectDialog
 from handcal_gui.connect.openxr_dialog import OpenxrDialog
-from handcal_gui.evaluate.entries import EvaluationEntries
+from handcal_gui.evaluate.entries import EvaluationEntries, make_specs
 from handcal_gui.library.export_dialog import Export, ExportDialog
 from handcal_gui.widgets.numbers import pluralize
 
@@ -225,7 +225,6 @@ class SeparateWindows(QObject):
     def evaluate(self) -> EvaluationWindow:
         """Show the evaluation window; there is at most one."""
         with _wait_cursor():
-            from handcal_gui.evaluate.specs import make_specs
             from handcal_gui.evaluate.window import EvaluationWindow
 
         opened = [one for one in self._window.findChildren(EvaluationWindow) if one.isVisible()]

@@ -6,18 +6,15 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 
-from PySide6.QtCore import QRect, QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QRect, QSize, Qt, QTimer
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import (
-    QAbstractItemView,
     QCheckBox,
     QDialog,
-    QHeaderView,
+    QInputDialog,
     QLabel,
     QMessageBox,
     QSizePolicy,
-    QTableWidget,
-    QTableWidgetItem,
     QWidget,
 )
 
@@ -26,13 +23,13 @@ from handcal.core.progress import Progress
 from handcal.core.types import EYES, Eye, Rig
 from handcal.link.discovery import Announcement
 from handcal.link.invitation import Invitation, qr_matrix
-from handcal.link.pairing import OFFER_S, Pairing, Pairings
+from handcal.link.pairing import OFFER_S, Pairings
 from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import HeadsetServer
 from handcal.station.checks.display_check import pattern_state, send_pattern
 from handcal.station.checks.doctor import Finding, Health
 from handcal.station.checks.headset import headset_problem, headset_state
-from handcal_gui.app.theme import SPACING_PX, flat_header, number_font, scale_font
+from handcal_gui.app.theme import SPACING_PX, number_font, scale_font
 from handcal_gui.app.translation import tr
 from handcal_gui.engine.jobs import Job
 from handcal_gui.widgets.fields import (
@@ -46,6 +43,7 @@ from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.result_rows import EYE_NAMES
 from handcal_gui.widgets.sentence import sentence
+from handcal_gui.widgets.table import Column, Row, Table
 
 _PERIOD_MS = 250
 _DELIVERIES = {
@@ -101,8 +99,7 @@ class ConnectDialog(QDialog):
         self._state = FindingLine("headset")
         self._attempts = paragraph("attempts")
         self._problem = paragraph("connectProblem")
-        self._devices = PairedDevices(server.pairings)
-        self._devices.failed.connect(self._problem.setText)
+        self._devices = PairedDevices(server.pairings, self._problem.setText)
         self._squares = {eye: _Square(eye) for eye in EYES}
         self._close = button("close", tr("&Close"))
         self._lay_out()
@@ -342,125 +339,82 @@ class QrCode(QWidget):
         painter.end()
 
 
-_NAME, _DEVICE = range(2)
+_DEVICE_COLUMNS = (Column(tr("Name"), is_number=False), Column(tr("Device"), is_number=False))
 
 
 class PairedDevices(QWidget):
-    """Shows the paired headsets, the connected one marked, with their names to edit.
+    """Shows the paired headsets, the connected one marked; renames and revokes them.
 
     Parameters
     ----------
     pairings : Pairings
-
-    Attributes
-    ----------
-    failed : Signal(str)
-        The reason why a change was not made.
+    fail : callable
+        Given the reason why a change was not made.
     """
 
-    failed = Signal(str)
-
-    def __init__(self, pairings: Pairings, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self._pairings = pairings
-        self._shown: tuple[tuple[Pairing, ...], str] = (), ""
-        self._is_filling = False
-        self._table = QTableWidget(0, 2)
-        self._table.setObjectName("pairedDevices")
-        self._table.setAccessibleName(tr("Paired headsets"))
-        self._table.setHorizontalHeaderLabels([tr("Name"), tr("Device")])
-        self._table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        self._table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-        self._table.setTabKeyNavigation(False)
-        self._table.setShowGrid(False)
-        self._table.setMinimumHeight(10 * SPACING_PX)
-        self._table.verticalHeader().hide()
-        across = self._table.horizontalHeader()
-        flat_header(across)
-        across.setSectionResizeMode(_NAME, QHeaderView.ResizeMode.Stretch)
-        across.setSectionResizeMode(_DEVICE, QHeaderView.ResizeMode.ResizeToContents)
-        self._empty = paragraph(
-            "noDevices", tr("None yet. Headsets appear here once they are paired.")
+    def __init__(self, pairings: Pairings, fail: Callable[[str], object]) -> None:
+        super().__init__()
+        self._pairings, self._fail = pairings, fail
+        self._connected_id = ""
+        self._shown: list[Row] = []
+        self._table = Table(
+            "pairedDevices",
+            tr("Paired headsets"),
+            tr("None yet. Headsets appear here once they are paired."),
+            chooses="one",
         )
-        self._empty.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self._rename = button("renameDevice", tr("Rena&me"), tr("Rename the chosen headset"))
+        self._table.setMinimumHeight(10 * SPACING_PX)
+        self._rename = button("renameDevice", tr("Rena&me…"), tr("Rename the chosen headset"))
         self._revoke = button(
             "revokeDevice",
             tr("Re&voke…"),
             tr("Revoke the chosen headset"),
             tr("It can then no longer connect"),
         )
-        self._table.itemChanged.connect(self._take_name)
-        self._table.itemSelectionChanged.connect(self._refresh)
-        self._rename.clicked.connect(self._edit_name)
+        self._table.chosen_changed.connect(self._refresh)
+        self._rename.clicked.connect(self._ask_name)
         self._revoke.clicked.connect(self._ask_to_revoke)
-        vbox(
-            self._empty,
-            (self._table, 1),
-            hbox(1, self._rename, self._revoke, spacing=SPACING_PX),
-            on=self,
-            margins=0,
-            spacing=SPACING_PX // 2,
-        )
         self._refresh()
+        foot = hbox(1, self._rename, self._revoke, spacing=SPACING_PX)
+        vbox((self._table, 1), foot, on=self, margins=0, spacing=SPACING_PX // 2)
 
     def show_devices(self, connected_id: str) -> None:
-        """Show the devices paired now, unless a name is being edited; mark the connected one."""
-        if (self._paired(), connected_id) != self._shown and not self._is_editing():
-            self._fill(connected_id)
-
-    def _paired(self) -> tuple[Pairing, ...]:
-        return tuple(one for one in self._pairings.all if one.device_id)
-
-    def _fill(self, connected_id: str) -> None:
-        chosen, devices = self._chosen(), self._paired()
-        self._shown = devices, connected_id
-        self._is_filling = True
-        self._table.setRowCount(len(devices))
-        for row, one in enumerate(devices):
-            name = QTableWidgetItem(one.name or tr("Without a name"))
-            is_connected = one.device_id == connected_id
-            device = QTableWidgetItem(
-                tr("{}, connected").format(one.device_id) if is_connected else one.device_id
+        """Show the devices paired now, and mark the connected one."""
+        self._connected_id = connected_id
+        connected = tr("{}, connected")
+        rows = [
+            Row(
+                "",
+                (
+                    one.name or tr("Without a name"),
+                    connected.format(one.device_id)
+                    if one.device_id == connected_id
+                    else one.device_id,
+                ),
+                key=one,
             )
-            device.setFlags(Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable)
-            device.setFont(number_font())
-            self._table.setItem(row, _NAME, name)
-            self._table.setItem(row, _DEVICE, device)
-        self._is_filling = False
-        for row, one in enumerate(devices):
-            if chosen is not None and one.device_id == chosen.device_id:
-                self._table.selectRow(row)
-        self._refresh()
+            for one in self._pairings.all
+            if one.device_id
+        ]
+        if rows != self._shown:
+            self._shown = rows
+            self._table.show_rows(_DEVICE_COLUMNS, rows)
 
-    def _is_editing(self) -> bool:
-        return self._table.state() == QAbstractItemView.State.EditingState
-
-    def _chosen(self) -> Pairing | None:
-        rows = self._table.selectionModel().selectedRows()
-        return self._shown[0][rows[0].row()] if rows else None
-
-    def _edit_name(self) -> None:
-        item = self._table.item(self._table.currentRow(), _NAME)
-        if item is not None:
-            self._table.editItem(item)
-
-    def _take_name(self, item: QTableWidgetItem) -> None:
-        if self._is_filling or item.column() != _NAME:
-            return
-        one = self._shown[0][item.row()]
-        self._change(lambda: self._pairings.rename(one.device_id, item.text().strip()))
+    def _ask_name(self) -> None:
+        [one] = self._table.chosen
+        title, label = tr("Rename"), tr("Name of the headset:")
+        name, is_given = QInputDialog.getText(self, title, label, text=one.name)
+        if is_given:
+            self._change(lambda: self._pairings.rename(one.device_id, name.strip()))
 
     def _ask_to_revoke(self) -> None:
-        one = self._chosen()
-        if one is None:
-            return
-        buttons = QMessageBox.StandardButton
+        [one] = self._table.chosen
         question = tr(
             "Revoke {}? Its session ends, and it connects again only after it has been "
             "paired again."
         ).format(one.name or one.device_id)
-        if QMessageBox.question(self, tr("Revoke"), plain_message(question)) == buttons.Yes:
+        answer = QMessageBox.question(self, tr("Revoke"), plain_message(question))
+        if answer == QMessageBox.StandardButton.Yes:
             self._change(lambda: self._pairings.revoke(one.device_id))
 
     def _change(self, change: Callable[[], None]) -> None:
@@ -468,13 +422,9 @@ class PairedDevices(QWidget):
         try:
             change()
         except (HandcalError, ValueError) as error:
-            self.failed.emit(str(error))
-        self._fill(self._shown[1])
+            self._fail(str(error))
+        self.show_devices(self._connected_id)
 
     def _refresh(self) -> None:
-        has_devices = bool(self._shown[0])
-        self._table.setVisible(has_devices)
-        self._empty.setVisible(not has_devices)
         for one in (self._rename, self._revoke):
-            one.setVisible(has_devices)
-            one.setEnabled(self._chosen() is not None)
+            one.setEnabled(bool(self._table.chosen))

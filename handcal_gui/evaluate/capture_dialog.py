@@ -9,9 +9,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QGuiApplication, QKeyEvent
-from PySide6.QtWidgets import QCheckBox, QLineEdit, QWidget
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QCheckBox, QWidget
 
 from handcal.camera.view_source import open_view_source
 from handcal.camera.viewpoint import ViewpointCamera, list_viewpoints
@@ -29,27 +29,24 @@ from handcal_gui.app.theme import SPACING_PX, scale_font
 from handcal_gui.app.translation import tr
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.evaluate.entries import CubeEntries
-from handcal_gui.evaluate.evaluation_page import PreparationDialog
-from handcal_gui.widgets.action_strip import one_of_strips
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.fields import button, main_button, paragraph, whole_number, with_name
-from handcal_gui.widgets.finding_line import FindingLine
-from handcal_gui.widgets.job_bar import JobBar
+from handcal_gui.widgets.fields import paragraph, with_name
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.widgets.sentence import sentence
 from handcal_gui.widgets.table import Column, Row, Table
+from handcal_gui.widgets.taking import BY_ITSELF, TakingDialog
 
-_FIRST_SIZE = QSize(1120, 760)
 _TURNED = tr("Turned to the display's axes")
 _NOT_TURNED = tr("Along the camera's axes")
 _ELSEWHERE = tr("Close this window to choose the file under Camera intrinsics.")
-_BY_ITSELF = tr("A&utomatically")
-_NOT_BY_ITSELF = tr("Automatically: stored images do not wait")
-MOST_POSES = 100
+_WHEN = tr(
+    "Take each image once the cube or the grid is at rest. Between two of the cube, cover it."
+)
+_NOT_BY_ITSELF = tr("Not automatically: stored images do not wait")
 
 
-class CaptureDialog(PreparationDialog):
+class CaptureDialog(TakingDialog):
     """Shows the live image and the next instruction; keeps only images with the expected content.
 
     Parameters
@@ -74,36 +71,24 @@ class CaptureDialog(PreparationDialog):
         open_source: Callable[..., ViewpointCamera] = open_view_source,
         list_cameras: Callable[[], list[int]] = list_viewpoints,
     ) -> None:
-        super().__init__(parent)
-        self.setObjectName("captureDialog")
-        self.setWindowTitle(tr("Take captures"))
+        cameras = LiveCameras((tr("Camera"),), open_source=open_source)
+        super().__init__(
+            *("captureDialog", tr("Take captures"), cameras, _WHEN),
+            *(self._keep_at_rest, self._show_judged, parent),
+        )
         self.entries = entries
         self._folder = user_path(entries.captures)
         self._plan: CapturePlan | None = None
         self._plan_problem = ""
         self._looked_for: tuple[Cube, Grid] | None = None
         self._list_cameras = list_cameras
-        self.form = _plan_form()
+        self.form = EntriesForm(CubeEntries, ("positions", "poses", "drawn", "with_grid"))
         self.form.show_entries(entries)
-        self._camera = LiveCameras((tr("Camera"),), open_source=open_source)
         self._list = Table("captures", tr("Images to take"), chooses="one")
         self._list.setMinimumWidth(36 * SPACING_PX)
         self._missing: frozenset[PlannedCapture] = frozenset()
         self._axes = paragraph("axes")
         self._instruction = paragraph("instruction")
-        self._found = FindingLine("capture")
-        self._bar = JobBar()
-        self._start = main_button("startCamera", tr("&Show"))
-        self._take = main_button("takeCapture", tr("Take again"))
-        self._mains = one_of_strips(self._start, self._take, keys="Space")
-        self._by_itself = with_name(
-            QCheckBox(_BY_ITSELF),
-            "byItself",
-            help_text=tr(
-                "Take each image once the cube or the grid is at rest. Between two images of the "
-                "cube, cover it."
-            ),
-        )
         self._large = with_name(
             QCheckBox(tr("Lar&ge view")),
             "largeView",
@@ -111,13 +96,8 @@ class CaptureDialog(PreparationDialog):
                 "Fill the screen with the live image, to align a hand with it. Escape goes back."
             ),
         )
-        self._close = button("close", tr("Cl&ose"))
         self._watch: RestWatch | None = None
-        self._is_watching = False
         self._warp: tuple[str, RotationWarp | None] = "", None
-        self._judge = LatestJob(self._keep_at_rest, self)
-        self._judge.answered.connect(self._on_judged)
-        self._judge.failed.connect(self._on_judging_failed)
         self._turn = LatestJob(
             lambda position: position_warp(self.entries, self._folder, position), self
         )
@@ -125,20 +105,11 @@ class CaptureDialog(PreparationDialog):
         self._turn.failed.connect(self._show_not_turned)
         self._look = LatestJob(lambda plan: missing_captures(self._folder, plan), self)
         self._look.answered.connect(self._show_missing)
-        self._look.failed.connect(self._show_failure)
+        self._look.failed.connect(super().show_failure)
         self.form.changed.connect(self._change_plan)
-        self._camera.images_changed.connect(self._refresh)
-        self._camera.failed.connect(self._show_camera_failure)
-        self._camera.images_changed.connect(self._consider)
-        self._list.chosen_changed.connect(self._refresh)
+        self._list.chosen_changed.connect(self.refresh)
         self._list.chosen_changed.connect(self._turn_view)
-        self._by_itself.toggled.connect(self._refresh)
         self._large.toggled.connect(self._enlarge)
-        self._start.clicked.connect(self.start)
-        self._take.clicked.connect(self.take)
-        self._close.clicked.connect(self.accept)
-        self._bar.busy_changed.connect(self._refresh)
-        self._bar.failed.connect(self._show_not_done)
         self._lay_out()
         self._list.setFocus()  # unlike a text field, it does not consume the space bar
         self._ask()
@@ -146,13 +117,12 @@ class CaptureDialog(PreparationDialog):
 
     def start(self) -> None:
         """Show images of the chosen camera."""
-        self._found.clear()
-        self._camera.start()
+        super().start()
         self._list.setFocus()
 
     def take(self) -> None:
         """Keep the present image as the selected capture, if it has the expected content."""
-        images, chosen = self._camera.images, self._chosen
+        images, chosen = self._cameras.images, self._chosen
         looked_for, watch = self._looked_for, self._watch
         if images is None or chosen is None or looked_for is None or watch is None:
             return
@@ -167,13 +137,17 @@ class CaptureDialog(PreparationDialog):
                 tr("Checking the image"), work, lambda seen: self._show_taken(chosen, seen)
             )
 
+    def asked(self) -> tuple[UInt8, PlannedCapture, int] | None:
+        """Return the image, the capture to take next and the time; None if none is to be taken."""
+        images, chosen = self._cameras.images, self._chosen
+        if images is None or chosen is None or self._bar.is_busy or self._is_taken_again:
+            return None
+        return images[0], chosen, time.monotonic_ns()
+
     def done(self, result: int) -> None:
         """Close camera and dialog."""
-        self._judge.stop()
         self._turn.stop()
-        self._camera.stop()
         self._look.stop()
-        self._bar.stop()
         super().done(result)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -182,20 +156,6 @@ class CaptureDialog(PreparationDialog):
             self._large.setChecked(False)
         else:
             super().keyPressEvent(event)
-
-    def _consider(self) -> None:
-        """Examine the present image, if captures are taken automatically and none is examined."""
-        images, chosen = self._camera.images, self._chosen
-        if (
-            self._by_itself.isChecked()
-            and not self._is_watching
-            and not self._bar.is_busy
-            and images is not None
-            and chosen is not None
-            and not self._is_taken_again
-        ):
-            self._is_watching = True
-            self._judge.ask((images[0], chosen, time.monotonic_ns()))
 
     def _keep_at_rest(self, seen: tuple[UInt8, PlannedCapture, int]) -> tuple[str, str]:
         """Keep an image at rest; return what it shows, or why not. Runs in the job's thread."""
@@ -207,18 +167,14 @@ class CaptureDialog(PreparationDialog):
             return "", why_not
         return keep_capture(image, self._folder, chosen, *self._looked_for), ""
 
-    def _on_judged(self, seen: tuple[UInt8, PlannedCapture, int], answer: tuple[str, str]) -> None:
-        self._is_watching = False
+    def _show_judged(
+        self, seen: tuple[UInt8, PlannedCapture, int], answer: tuple[str, str]
+    ) -> None:
         shown, why_not = answer
         if shown:
             self._show_taken(seen[1], shown)
         else:
             self._found.show_finding(Finding("", Health.LIMITED, tr("waiting: {}").format(why_not)))
-
-    def _on_judging_failed(self, why: str) -> None:
-        self._is_watching = False
-        self._by_itself.setChecked(False)
-        self._show_not_done(why)
 
     def _turn_view(self) -> None:
         """Turn the live image as at the position of the selected capture."""
@@ -241,7 +197,7 @@ class CaptureDialog(PreparationDialog):
         self._show_through(None, f"{_NOT_TURNED}; {why}. {_ELSEWHERE}")
 
     def _show_through(self, warp: Callable[[UInt8], UInt8] | None, axes: str) -> None:
-        self._camera.show_through(warp)
+        self._cameras.show_through(warp)
         self._axes.setText(axes)
 
     def _warped(self, image: UInt8) -> UInt8:
@@ -258,7 +214,7 @@ class CaptureDialog(PreparationDialog):
     def _enlarge(self, is_large: bool) -> None:
         self.form.setVisible(not is_large)
         self._list.setVisible(not is_large)
-        self._camera.show_only_images(is_large)
+        self._cameras.show_only_images(is_large)
         if is_large:
             self.showFullScreen()
         else:
@@ -270,8 +226,8 @@ class CaptureDialog(PreparationDialog):
     def _begin(self, found: tuple[tuple[Cube, Grid], list[int]]) -> None:
         self._looked_for, numbers = found
         self._watch = RestWatch(*self._looked_for)
-        self._camera.add_cameras(numbers)
-        self._refresh()
+        self._cameras.add_cameras(numbers)
+        self.refresh()
 
     def _change_plan(self) -> None:
         self.entries = self.form.take(self.entries)
@@ -303,7 +259,7 @@ class CaptureDialog(PreparationDialog):
         places = [place for place, one in enumerate(plan.captures) if one in self._missing]
         following = sorted(places, key=lambda place: (place < last, place))
         self._list.choose([plan.captures[place] for place in following[:1]])
-        self._refresh()
+        self.refresh()
 
     @property
     def _chosen(self) -> PlannedCapture | None:
@@ -324,7 +280,7 @@ class CaptureDialog(PreparationDialog):
             self._warp = "", None
         self._ask()
 
-    def _show_not_done(self, why: str) -> None:
+    def show_failure(self, why: str) -> None:
         """Show why an image was not taken, or why none can be taken."""
         if self._looked_for is None:
             where = tr("close this window to choose the files of the cube and the rig")
@@ -333,21 +289,15 @@ class CaptureDialog(PreparationDialog):
             found = tr("not taken: {}").format(why)
             self._found.show_finding(Finding("", Health.LIMITED, found))
 
-    def _show_camera_failure(self, why: str) -> None:
-        advice = tr("press Show to open the camera again")
-        self._found.show_finding(Finding("", Health.BROKEN, why, advice))
-
-    def _show_failure(self, why: str) -> None:
-        self._found.show_finding(Finding("", Health.BROKEN, why))
-
-    def _refresh(self) -> None:
-        is_ready = self._looked_for is not None and not self._bar.is_busy
-        is_seen = self._camera.images is not None and self._chosen is not None
-        self._start.setEnabled(self._looked_for is not None)
-        self._take.setEnabled(is_ready and is_seen)
-        self._mains.setCurrentIndex(int(self._camera.images is not None))
-        are_stored = self._camera.are_stored  # and would be paired as they come, not as asked for
-        self._by_itself.setText(_NOT_BY_ITSELF if are_stored else _BY_ITSELF)
+    def refresh(self) -> None:
+        """Show what to take next, and whether it can be taken."""
+        super().refresh()
+        is_ready = self._looked_for is not None
+        self._start.setEnabled(is_ready)
+        is_free = is_ready and self._chosen is not None
+        self._take.setEnabled(is_free and self._take.isEnabled())
+        are_stored = self._cameras.are_stored  # and would be paired as they come, not as asked for
+        self._by_itself.setText(_NOT_BY_ITSELF if are_stored else BY_ITSELF)
         self._by_itself.setEnabled(not are_stored)
         self._by_itself.setChecked(self._by_itself.isChecked() and not are_stored)
         self._take.setText(tr("Take again") if self._is_taken_again else tr("Take"))
@@ -360,58 +310,22 @@ class CaptureDialog(PreparationDialog):
             return tr("All captures have been taken.")
         if self._looked_for is None or self._chosen is None:
             return ""
-        if self._camera.images is None:
+        if self._cameras.images is None:
             return tr("Choose the camera, and press Show.")
         return f"{instruction(self._chosen)}."
 
     def _lay_out(self) -> None:
         scale_font(self._instruction, 1.6, is_bold=True)
         self._instruction.setMinimumHeight(self._instruction.fontMetrics().height())
-        middle = hbox((self._camera, 1), self._list, spacing=2 * SPACING_PX)
-        others = self._close, self._by_itself, self._large
-        foot = hbox(*others, (self._bar, 1), self._mains, spacing=SPACING_PX)
+        middle = hbox((self._cameras, 1), self._list, spacing=2 * SPACING_PX)
         vbox(
             self._instruction,
             self.form,
             (middle, 1),
             self._axes,
             self._found,
-            foot,
+            self._foot(self._large),
             on=self,
             margins=2 * SPACING_PX,
             spacing=SPACING_PX,
         )
-        self.resize(QGuiApplication.primaryScreen().availableSize().boundedTo(_FIRST_SIZE))
-
-
-def _plan_form() -> EntriesForm:
-    positions = with_name(
-        QLineEdit(),
-        "positions",
-        tr("Positions"),
-        tr("Positions of the camera in the eye box: names of folders, separated by commas."),
-    )
-    poses = whole_number("poses", 1, MOST_POSES, tr("Poses of the cube at each position."))
-    drawn = with_name(
-        QLineEdit(placeholderText=tr("One"), clearButtonEnabled=True),
-        "drawn",
-        tr("Renderings"),
-        tr("Names of the renderings to compare, such as: before, after."),
-    )
-    with_grid = with_name(
-        QCheckBox(tr("At &each position")),
-        "withGrid",
-        tr("Display's grid"),
-        tr(
-            "Without the grid, errors are measured along the camera's axes instead of the "
-            "display's."
-        ),
-    )
-    return EntriesForm(
-        {
-            "positions": (tr("&Positions"), positions),
-            "poses": (tr("Poses &at each"), poses),
-            "drawn": (tr("&Renderings"), drawn),
-            "with_grid": (tr("Display's grid"), with_grid),
-        }
-    )

@@ -26,18 +26,6 @@ from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import keep_space, vbox
 
 
-class PreparationDialog(QDialog):
-    """Base of dialogs that prepare the data of an evaluation.
-
-    Attributes
-    ----------
-    entries : object
-        Entries of the evaluation, with the changes made here.
-    """
-
-    entries: Any
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Preparation:
     """A preparation of an evaluation: its button and its dialog."""
@@ -47,8 +35,8 @@ class Preparation:
     """Text and tooltip of the button."""
     is_possible: Callable[[Any], bool]
     """Returns whether the entries suffice to open the dialog."""
-    dialog: Callable[[Any, QWidget], PreparationDialog]
-    """Creates the dialog, given entries and a parent."""
+    dialog: Callable[[Any, QWidget], QDialog]
+    """Creates the dialog, given entries and a parent; its `entries` have the changes made there."""
     name: str = "prepare"
     """Object name of the button."""
     request: str = ""
@@ -110,7 +98,7 @@ class EvaluationPage(QWidget):
         self.form = spec.form()
         self.form.show_entries(entries)
         self._button = main_button("run", tr("Run"))
-        self._dialog: PreparationDialog | None = None
+        self._dialog: Any = None
         self._preparing = {
             button(one.name, one.button, help_text=one.help_text): one for one in spec.preparations
         }

@@ -180,13 +180,10 @@ def _key_tables(report: Report) -> list[ReportTable]:
 
 
 def _titles(tables: list[ReportTable]) -> list[str]:
-    """Return the beginnings of the tables' captions; numbers if these do not tell them apart."""
+    """Return the tables' names; numbers for those without one."""
     if len(tables) == 1:
         return [tr("Numbers")]
-    titles = [sentence(one.caption.partition(",")[0].rstrip(".")) for one in tables]
-    if all(titles) and len(set(titles)) == len(titles):
-        return titles
-    return [tr("Numbers {}").format(number) for number in range(1, len(tables) + 1)]
+    return [one.name or tr("Numbers {}").format(n) for n, one in enumerate(tables, 1)]
 
 
 def _table_page(table: ReportTable) -> QWidget:

@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 from PySide6.QtCore import QPointF, QTimer
 from PySide6.QtGui import QColor, QPainter, QPen
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QDialog, QWidget
 from scipy.spatial.transform import Rotation
 
 from handcal.core.progress import Progress
@@ -27,10 +27,9 @@ from handcal_gui.app.theme import SPACING_PX, colors
 from handcal_gui.app.translation import tr
 from handcal_gui.evaluate.devices import depth_camera, paired_headset, pairing_problem
 from handcal_gui.evaluate.entries import CubeEntries
-from handcal_gui.evaluate.evaluation_page import PreparationDialog
 from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.fields import button, choice, main_button, one_of
+from handcal_gui.widgets.fields import button, main_button, one_of
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.job_bar import JobBar
@@ -46,7 +45,7 @@ _EDGES = tuple(
 Track: TypeAlias = Callable[..., CubeTracking]
 
 
-class TrackDialog(PreparationDialog):
+class TrackDialog(QDialog):
     """Shows the depth camera's image with the cube's edges, and the filtered pose beside it.
 
     Parameters
@@ -72,23 +71,7 @@ class TrackDialog(PreparationDialog):
         self._track, self._pairing_problem = track, pairing_problem
         self._sight: CubeSight | None = None
         self._shown: CubeSight | None = None
-        self.form = EntriesForm(
-            {
-                "tracked_by": (
-                    tr("Tracked &by"),
-                    choice(
-                        "trackedBy",
-                        tr("Tracked by"),
-                        {
-                            "network": tr("RealSense on a paired headset"),
-                            "camera": tr("RealSense that does not move"),
-                            "virtual": tr("Simulator"),
-                        },
-                        tr("A headset draws the cube's edges where it stands in the room."),
-                    ),
-                ),
-            }
-        )
+        self.form = EntriesForm(CubeEntries, ("tracked_by",))
         self.form.show_entries(entries)
         self._view = ImageView(tr("Depth camera, colour"))
         self._view.setMinimumSize(56 * SPACING_PX, 32 * SPACING_PX)

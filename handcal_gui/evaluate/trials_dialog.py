@@ -10,7 +10,7 @@ from functools import partial
 from typing import TypeAlias
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QGridLayout, QWidget
+from PySide6.QtWidgets import QDialog, QGridLayout, QWidget
 
 from handcal.core.errors import FileError
 from handcal.core.progress import Progress
@@ -25,15 +25,13 @@ from handcal_gui.app.theme import SPACING_PX, scale_font
 from handcal_gui.app.translation import tr
 from handcal_gui.evaluate.devices import depth_camera, paired_headset
 from handcal_gui.evaluate.entries import UserEntries
-from handcal_gui.evaluate.evaluation_page import PreparationDialog
 from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.fields import button, choice, main_button, paragraph, with_name
+from handcal_gui.widgets.fields import button, main_button, paragraph, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
-from handcal_gui.widgets.path_field import PathField
 from handcal_gui.widgets.result_rows import EYE_NAMES
 from handcal_gui.widgets.table import Row, Table
 
@@ -112,7 +110,7 @@ class _Desk:
                 continue
 
 
-class TrialsDialog(PreparationDialog):
+class TrialsDialog(QDialog):
     """Leads through the trials of one session: place the cube, adjust φ, for each eye.
 
     Parameters
@@ -144,23 +142,7 @@ class TrialsDialog(PreparationDialog):
         self._desk: _Desk | None = None
         self._step: _Step | None = None
         self._has_session, self._stored = False, ""
-        self.form = EntriesForm(
-            {
-                "headset": (
-                    tr("&Headset"),
-                    choice(
-                        "headset",
-                        tr("Headset"),
-                        {"network": tr("Paired headset, RealSense"), "virtual": tr("Simulator")},
-                        tr("The simulator needs a session of a simulated wearer, who adjusts φ."),
-                    ),
-                ),
-                "cube": (
-                    tr("C&ube"),
-                    PathField(tr("Cube"), "file", tr("Cubes (*.json)"), tr("60 mm cube")),
-                ),
-            }
-        )
+        self.form = EntriesForm(UserEntries, ("headset", "cube"))
         self.form.show_entries(entries)
         self._instruction = paragraph("instruction")
         self._found = FindingLine("trials")

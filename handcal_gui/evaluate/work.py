@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import cv2
 import numpy as np
@@ -16,12 +16,12 @@ from handcal.core.types import UInt8
 from handcal.io.files import require_writable
 from handcal.io.images import read_image
 from handcal.lab.settings import output_folder
-from handcal.lab.study.run import RUNNING, Study, share_done
-from handcal.lab.study.store import free_of_studies
-from handcal.lab.study.studies import STUDY_SHARE
 from handcal.report.document import Report
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.app.translation import tr
+
+if TYPE_CHECKING:
+    from handcal.lab.study.run import Study
 
 _MINUTE_S = 60.0
 
@@ -86,6 +86,8 @@ class StudyEvaluation:
 
     def readiness(self, entries: Any) -> Readiness:
         """Return how much of the study the folder contains."""
+        from handcal.lab.study.run import share_done
+
         folder = output_folder(entries.output)
         share = share_done(self.study(entries), folder)
         if share == 1.0:
@@ -102,6 +104,9 @@ class StudyEvaluation:
 
     def run(self, entries: Any, progress: Progress) -> Outcome:
         """Run or resume the study, and report its progress with the remaining time."""
+        from handcal.lab.study.run import RUNNING, share_done
+        from handcal.lab.study.studies import STUDY_SHARE
+
         study, folder = self.study(entries), output_folder(entries.output)
         count, begun, start_s = len(study.cases), share_done(study, folder), time.monotonic()
 
@@ -130,6 +135,8 @@ class FileEvaluation:
 
     def readiness(self, entries: Any) -> Readiness:
         """Return which entry is missing, or whether an earlier report will be replaced."""
+        from handcal.lab.study.store import free_of_studies
+
         if missing := self.missing(entries):
             return Readiness(Finding("", Health.BROKEN, missing))
         folder = free_of_studies(output_folder(entries.output))

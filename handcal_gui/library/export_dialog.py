@@ -47,33 +47,20 @@ from handcal_gui.widgets.path_field import PathField
 
 Export = Callable[[Path, ExportSettings, Progress], Exported]
 
-_PURPOSES: dict[Format, str] = {
-    "report": tr("Verdict, eye shifts, figures and settings, to read and archive"),
-    "html": tr("The report for a browser, and each figure with its data"),
-    "csv": tr("Each φ with its errors, each corner of each trial: for statistics"),
-    "yaml": tr("Projection, K, H0 and φ of each eye, read by cv2.FileStorage"),
-    "json": tr("The projections in the convention of each system"),
-    "ply": tr("Cursor and hand of each alignment, with residuals"),
-    "zip": tr("All recorded data, to archive or to open elsewhere"),
-    "unity": tr("The final calibration for Unity's JsonUtility"),
-    "openxr": tr("The final calibration as views of OpenXR: poses and angles"),
-    "northstar": tr("The final calibration for Monado's North Star driver"),
-    "slicer": tr("The eyes as transforms and the clouds as models"),
+_PURPOSES: dict[Format, tuple[str, str]] = {
+    "report": ("R", tr("Verdict, eye shifts, figures and settings, to read and archive")),
+    "html": ("H", tr("The report for a browser, and each figure with its data")),
+    "csv": ("V", tr("Each φ with its errors, each corner of each trial: for statistics")),
+    "yaml": ("Y", tr("Projection, K, H0 and φ of each eye, read by cv2.FileStorage")),
+    "json": ("J", tr("The projections in the convention of each system")),
+    "ply": ("P", tr("Cursor and hand of each alignment, with residuals")),
+    "zip": ("Z", tr("All recorded data, to archive or to open elsewhere")),
+    "unity": ("U", tr("The final calibration for Unity's JsonUtility")),
+    "openxr": ("X", tr("The final calibration as views of OpenXR: poses and angles")),
+    "northstar": ("N", tr("The final calibration for Monado's North Star driver")),
+    "slicer": ("S", tr("The eyes as transforms and the clouds as models")),
 }
-_LETTERS: dict[Format, str] = {
-    "report": "R",
-    "html": "H",
-    "csv": "V",
-    "yaml": "Y",
-    "json": "J",
-    "ply": "P",
-    "zip": "Z",
-    "unity": "U",
-    "openxr": "X",
-    "northstar": "N",
-    "slicer": "S",
-}
-"""Letter in the title of each format that ticks it."""
+"""Of each format: the letter in its title that ticks it, and what it is for."""
 _NOTHING = tr("nothing was exported; the reasons are below, and earlier exports are unchanged")
 _UNCHANGED = tr("the session and earlier exports are unchanged")
 _SLOW_MS = 300
@@ -127,7 +114,7 @@ class ExportDialog(QDialog):
         self._is_checked = self._is_refused = self._is_closing = False
         self._made = Exported(())
         self._boxes = {
-            kind: with_name(QCheckBox(_lettered(info.title, _LETTERS[kind])), kind)
+            kind: with_name(QCheckBox(_lettered(info.title, _PURPOSES[kind][0])), kind)
             for kind, info in {**FORMATS, **TOOL_FORMATS}.items()
         }
         self._near = number("near", 0.01, 1.0, 0.05, " m", tr("Anything nearer is not drawn."))
@@ -327,7 +314,7 @@ class ExportDialog(QDialog):
                 formats.addWidget(heading, formats.rowCount(), 0)
             row = formats.rowCount()
             formats.addWidget(box, row, 0)
-            formats.addWidget(QLabel(_PURPOSES[kind]), row, 1)
+            formats.addWidget(QLabel(_PURPOSES[kind][1]), row, 1)
         form = QFormLayout()
         form.setHorizontalSpacing(2 * SPACING_PX)
         form.setVerticalSpacing(SPACING_PX)

@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from handcal.core.entry import RIG_FILES
 from handcal.core.errors import FileError, HandcalError
 from handcal.core.types import PART_NAMES, Rig, UInt8
 from handcal.io.images import write_png
@@ -202,8 +203,7 @@ class BoardPage(QWidget):
         self._found.show_finding(Finding("", Health.GOOD, tr("saved as {}").format(path), advice))
 
     def _ask_for_rig(self) -> None:
-        title, pattern = tr("Choose an initial rig"), tr("Rig files (*.yaml *.yml)")
-        if path := ask_open(self._project, self, title, pattern):
+        if path := ask_open(self._project, self, tr("Choose an initial rig"), tr(RIG_FILES)):
             self._start_from(path)
 
     def _start_from(self, path: Path) -> None:

@@ -8,17 +8,15 @@ from PySide6.QtWidgets import QWidget
 
 from handcal.camera.take_board import DEPTH_TO_COLOR, IMAGER
 from handcal.rig.boards.views import ASKED_VIEWS
-from handcal.rig.formats import read_intrinsics, read_pose
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.app.translation import tr
 from handcal_gui.rig.images_panel import ImagesPanel
-from handcal_gui.rig.lens_fields import intrinsics_field, lens_field
 from handcal_gui.rig.project import UNREADABLE, RigProject
+from handcal_gui.rig.project_folder import StereoEntries, ViewpointEntries
 from handcal_gui.rig.solve import SolvedPart, solve_stereo, solve_viewpoint
 from handcal_gui.rig.solve_box import HEALTHS
 from handcal_gui.rig.step_page import StepPage, images_needed
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
 
 _STEREO_HINT = tr(
     "Take {} or more pairs of simultaneous images of the board: near and far, in all parts of both "
@@ -31,50 +29,7 @@ class StereoPage(StepPage):
     """Pairs of images of the board, and the pose solved from them."""
 
     def __init__(self, project: RigProject, parent: QWidget | None = None) -> None:
-        imager = PathField(
-            tr("Depth imager's intrinsics"),
-            "file",
-            INTRINSICS_FILES,
-            tr("Not needed"),
-            read=read_intrinsics,
-        )
-        imager.setToolTip(
-            tr(
-                "Needed only if the images come from a colour imager beside the depth imager and "
-                "the depth is not aligned to it. Take images… reads them from a RealSense."
-            )
-        )
-        pose = PathField(
-            tr("Pose from depth to colour"),
-            "file",
-            tr("Poses (*.yaml *.yml *.json)"),
-            tr("Not needed"),
-            read=read_pose,
-        )
-        pose.setToolTip(imager.toolTip())
-        form = EntriesForm(
-            {
-                "depth_images": (
-                    tr("&Depth camera's images"),
-                    PathField(tr("Depth images"), "folder"),
-                ),
-                "depth_intrinsics": (
-                    tr("Its in&trinsics"),
-                    intrinsics_field(tr("Depth intrinsics")),
-                ),
-                "imager_intrinsics": (tr("Depth ima&ger's intrinsics"), imager),
-                "lens": (tr("L&ens"), lens_field()),
-                "headset_images": (
-                    tr("&Headset camera's images"),
-                    PathField(tr("Headset images"), "folder"),
-                ),
-                "headset_intrinsics": (
-                    tr("Its intrinsi&cs"),
-                    intrinsics_field(tr("Headset intrinsics")),
-                ),
-                "depth_to_color": (tr("Pose &from depth to colour"), pose),
-            }
-        )
+        form = EntriesForm(StereoEntries)
         panel = ImagesPanel(
             project,
             (tr("Depth camera"), tr("Headset camera")),
@@ -128,23 +83,7 @@ class ViewpointPage(StepPage):
     """Images of the board and the intrinsics solved from them, or a file of intrinsics."""
 
     def __init__(self, project: RigProject, parent: QWidget | None = None) -> None:
-        given = PathField(
-            tr("Intrinsics"),
-            "file",
-            INTRINSICS_FILES,
-            tr("Solved from the images"),
-            read=read_intrinsics,
-        )
-        form = EntriesForm(
-            {
-                "images": (
-                    tr("&Viewpoint camera's images"),
-                    PathField(tr("Viewpoint images"), "folder"),
-                ),
-                "lens": (tr("L&ens"), lens_field()),
-                "intrinsics": (tr("Its in&trinsics"), given),
-            }
-        )
+        form = EntriesForm(ViewpointEntries)
         panel = ImagesPanel(
             project, (tr("Viewpoint camera"),), _VIEWPOINT_HINT, "setup-viewpoint", ("images",)
         )

@@ -13,23 +13,18 @@ from handcal.io.images import write_png
 from handcal.rig.boards.board import Board
 from handcal.rig.boards.choose import ALIKE
 from handcal.rig.displays.grid import Grid, draw_grid, grid_on
-from handcal.rig.steps import ASKED_BOARDS, ASKED_GRIDS, screen_of, view_in
+from handcal.rig.steps import ASKED_BOARDS, ASKED_GRIDS, screen_of
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.app.translation import tr
 from handcal_gui.rig.file_dialogs import ask_save
 from handcal_gui.rig.images_panel import ImagesPanel
 from handcal_gui.rig.project import RigProject
-from handcal_gui.rig.project_folder import Distance
+from handcal_gui.rig.project_folder import DisplayEntries
 from handcal_gui.rig.solve import CAMERA_MISSING, SolvedPart, solve_display
 from handcal_gui.rig.step_page import StepPage, images_needed
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.fields import button, choice, make_linked, number, whole_number
-from handcal_gui.widgets.path_field import PathField
+from handcal_gui.widgets.fields import button, make_linked
 
-_DISTANCES: dict[Distance, str] = {
-    "measured": tr("measured"),
-    "solved": tr("from the squares' angle"),
-}
 _GRID_HINT = tr(
     "Save the grid and show it on this display unscaled. With the viewpoint camera at the eye "
     "position, focused on the display, take {} or more images in the dark."
@@ -59,88 +54,6 @@ class DisplayPage(StepPage):
         read: Callable[[str], object],
         parent: QWidget | None = None,
     ) -> None:
-        distance = choice(
-            "distance",
-            tr("Distance of the virtual screen"),
-            _DISTANCES,
-            tr(
-                "Distance of the virtual screen from the viewpoint camera, z(C0→S): measured, for "
-                "example by the camera's focus, or solved from the angle that a square subtends "
-                "at the nominal distance."
-            ),
-        )
-        distance_m = number(
-            "distanceM",
-            0.1,
-            100.0,
-            0.01,
-            " m",
-            tr("Measured distance of the virtual screen, in metres."),
-        )
-        arcmin = number(
-            "arcmin",
-            1.0,
-            1e4,
-            0.1,
-            "′",
-            tr("Angle that a square of the grid subtends, in arcminutes."),
-        )
-        nominal = number(
-            "nominal",
-            0.1,
-            100.0,
-            0.01,
-            " m",
-            tr("Nominal distance for this angle, from the manufacturer, in metres."),
-        )
-        square = whole_number(
-            "gridSquare", 20, 2000, tr("Side length of the grid's squares, in pixels.")
-        )
-        square.setSuffix(" px")
-        tracked = PathField(tr("Tracked poses"), "file", tr("Tracked poses (*.json)"))
-        tracked.setToolTip(
-            tr(
-                "Poses of the board as tracked by the headset, for each image: {}, in metres."
-            ).format('{"handcal_tracked": 1, "T_H_B": {"image.png": [4 rows of 4]}}')
-        )
-        stereo = PathField(
-            tr("Stereo calibration"),
-            "file",
-            tr("Stereo calibrations (*.json)"),
-            tr("Instead of the images of the board"),
-        )
-        stereo.setToolTip(
-            tr(
-                "Instead of images and poses of the board: the result of 'handcal rig stereo' with "
-                "the viewpoint camera as depth camera."
-            )
-        )
-        files = tr("Matrices (*.txt *.json *.yaml *.yml)")
-        view = PathField(tr("Rendering camera"), "file", files, tr("As in the rig"), read=view_in)
-        view.setToolTip(
-            tr(
-                "Transform from the headset rig to this eye's rendering camera, T_V_H, as the "
-                "headset reports it: 4 rows of 4 numbers, in metres; x right, y down, z forward. "
-                "If empty, that of the initial rig is used."
-            )
-        )
-        form = EntriesForm(
-            {
-                "grid_images": (tr("Images of t&he grid"), PathField(tr("Grid images"), "folder")),
-                "square_px": (tr("Grid s&quares"), square),
-                "board_images": (
-                    tr("Images o&f the board"),
-                    PathField(tr("Board images"), "folder"),
-                ),
-                "tracked": (tr("&Poses of the board"), tracked),
-                "stereo": (tr("S&tereo calibration"), stereo),
-                "view": (tr("R&endering camera's pose"), view),
-                "distance": (tr("S&creen's distance"), distance),
-                "distance_m": (tr("Me&asured distance"), distance_m),
-                "square_arcmin": (tr("An&gle of a square"), arcmin),
-                "nominal_m": (tr("Nominal &distance"), nominal),
-            }
-        )
         camera = (tr("Viewpoint camera"),)
         of_grid = ("grid_images",), "dropped_grid", tr("&Take images…"), tr("Find the grid &again")
         grid = ImagesPanel(project, camera, _GRID_HINT, "setup-display", *of_grid)
@@ -150,11 +63,11 @@ class DisplayPage(StepPage):
         )
         board = ImagesPanel(project, camera, _BOARD_HINT, "setup-board", *of_board)
         panels = {tr("Grid on the displa&y"): grid, tr("Ca&mera pose"): board}
+        form = EntriesForm(DisplayEntries)
         super().__init__(f"{eye}DisplayPage", eye, project, form, panels, parent)
         make_linked(board.hint).linkActivated.connect(read)
         self._eye: Eye = eye
         self._grid, self._board = grid, board
-        self._by_distance = {"measured": (distance_m,), "solved": (arcmin, nominal)}
         self._save = button(
             "saveGrid", tr("Save &grid…"), help_text=tr("PNG, to show on the display")
         )
@@ -173,9 +86,10 @@ class DisplayPage(StepPage):
 
     def enter(self) -> None:
         """Search the folders for grid and board, unless already done."""
-        for distance, fields in self._by_distance.items():
-            for field in fields:
-                field.setEnabled(distance == self.entries.distance)
+        is_measured = self.entries.distance == "measured"
+        self.form.field("distance_m").setEnabled(is_measured)
+        for name in ("square_arcmin", "nominal_m"):
+            self.form.field(name).setEnabled(not is_measured)
         super().enter()
 
     def solve(self) -> None:

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 from PySide6.QtCore import QPointF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QIcon, QImage, QPainter, QPen, QPixmap
+from PySide6.QtGui import QColor, QImage, QPainter, QPen, QPixmap
 from PySide6.QtWidgets import (
-    QHeaderView,
     QLabel,
     QPushButton,
     QSplitter,
-    QTreeWidget,
-    QTreeWidgetItem,
     QWidget,
 )
 
@@ -25,8 +22,9 @@ from handcal.core.types import UInt8
 from handcal.io.files import user_path
 from handcal.rig.boards.board import Board, BoardView
 from handcal.rig.boards.views import BoardImage, coverage
+from handcal.rig.lens.fit import CalibrationVerdict
 from handcal.station.checks.doctor import Finding, Health
-from handcal_gui.app.theme import SPACING_PX, colors, flat_header, follow_theme, icon, number_font
+from handcal_gui.app.theme import SPACING_PX, colors
 from handcal_gui.app.translation import tr
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.rig.maps import CoverageMap, UncertaintyMap
@@ -41,6 +39,7 @@ from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_label import UNKNOWN
 from handcal_gui.widgets.sentence import sentence
+from handcal_gui.widgets.table import Column, Row, Table
 
 
 class ImagesPanel(QWidget):
@@ -95,7 +94,11 @@ class ImagesPanel(QWidget):
         self.buttons, self.search = QWidget(), QWidget()
         self.shots: tuple[Shot, ...] = ()
         self._question: tuple[tuple[Path, ...], Board] | None = None
-        self._list = ShotList(tr("Images"))
+        self._dropped: frozenset[str] = frozenset()
+        self._list = Table("shots", tr("Images"), chooses="one")
+        self._list.setIconSize(_PICTURE_PX)
+        self._list.setMinimumSize(34 * SPACING_PX, 12 * SPACING_PX)
+        self._list.offer_ticks(self._tick)
         self._view = ShotView(titles)
         self._maps = tuple(CoverageMap(title) for title in titles)
         self._sigmas = tuple(UncertaintyMap(title) for title in titles)
@@ -124,9 +127,7 @@ class ImagesPanel(QWidget):
         self.bar.failed.connect(self.show_trouble)
         self.bar.busy_changed.connect(self.bar.setVisible)
         self.bar.hide()
-        self._list.chosen.connect(self._show_chosen)
-        self._list.dropped_changed.connect(self._refresh)
-        self._list.dropped_changed.connect(self.dropped_changed)
+        self._list.chosen_changed.connect(self._show_chosen)
         self._lay_out()
         self._show_map()
         self._refresh()
@@ -134,8 +135,7 @@ class ImagesPanel(QWidget):
     @property
     def used(self) -> int:
         """Number of images in which the board was found and that are not excluded."""
-        out = frozenset(self._list.dropped)
-        return sum(not shot.problem and shot.name not in out for shot in self.shots)
+        return sum(not shot.problem and shot.name not in self._dropped for shot in self.shots)
 
     @property
     def count(self) -> str:
@@ -144,7 +144,8 @@ class ImagesPanel(QWidget):
 
     def dropped_of(self, before: tuple[str, ...]) -> tuple[str, ...]:
         """Return the excluded images; `before` while no images are shown."""
-        return self._list.dropped if self.shots else before
+        names = (shot.name for shot in self.shots)
+        return tuple(name for name in names if name in self._dropped) if self.shots else before
 
     def add_button(self, added: QPushButton) -> None:
         """Add a button in front of the panel's own."""
@@ -178,8 +179,7 @@ class ImagesPanel(QWidget):
 
     def show_solved(self, solved: SolvedPart) -> None:
         """Show the residual of each image."""
-        worst = (solved.worst.name, solved.worst.why) if solved.worst else ("", "")
-        self._list.show_results(solved.residuals_px, solved.tilts_rad, worst)
+        self._show_rows(solved)
         for shown, found in zip(self._sigmas, solved.uncertainties, strict=False):
             shown.show_uncertainty(found)
 
@@ -199,7 +199,9 @@ class ImagesPanel(QWidget):
         self.shots = shots
         self._trouble.hide()
         self._view.show_shot(None)
-        self._list.show_shots(shots, dropped, tr("another board") if other else "")
+        self._dropped = frozenset(dropped)
+        self._show_rows(_UNSOLVED, tr("⚠ Another board") if other else "")
+        self._list.choose(self._list.keys[:1])
         self._refresh()
         self.dropped_changed.emit()
         if self._question is not None and not all(shot.problem for shot in shots):
@@ -228,12 +230,28 @@ class ImagesPanel(QWidget):
         self._trouble.show_finding(Finding("", Health.BROKEN, found), label, use)
         self._trouble.show()
 
-    def _show_chosen(self, place: int) -> None:
-        self._view.show_shot(self.shots[place] if place >= 0 else None)
+    def _show_rows(self, solved: SolvedPart, note: str = "") -> None:
+        """List the images; a note stands in place of each problem if it explains all of them."""
+        rows = []
+        for shot in self.shots:
+            *cells, own = (text(shot, solved) for text in _SHOWN.values())
+            small = None if shot.small is None else partial(_picture, shot.small)
+            is_ticked = shot.name not in self._dropped
+            texts = (*cells, note or own)
+            rows.append(Row("", texts, key=shot.name, picture=small, is_ticked=is_ticked))
+        self._list.show_rows(tuple(_SHOWN), rows)
+
+    def _tick(self, name: str, is_ticked: bool) -> None:
+        self._dropped = self._dropped - {name} if is_ticked else self._dropped | {name}
+        self._refresh()
+        self.dropped_changed.emit()
+
+    def _show_chosen(self) -> None:
+        shots = {shot.name: shot for shot in self.shots}
+        self._view.show_shot(next((shots[name] for name in self._list.chosen), None))
 
     def _refresh(self) -> None:
-        out = frozenset(self._list.dropped)
-        kept = [shot for shot in self.shots if shot.name not in out]
+        kept = [shot for shot in self.shots if shot.name not in self._dropped]
         for number, shown in enumerate(self._maps):
             found = [one for shot in kept if (one := shot.views[number].found) is not None]
             shown.show_coverage(coverage(found) if found else None)
@@ -253,6 +271,7 @@ class ImagesPanel(QWidget):
         split.addWidget(self._list)
         split.addWidget(self._view)
         split.setStretchFactor(1, 1)
+        split.setSizes([60 * SPACING_PX, 40 * SPACING_PX])
         hbox((split, 1), side, on=self, margins=SPACING_PX, spacing=2 * SPACING_PX)
         buttons = self.take, self.again
         self._button_row = hbox(*buttons, 1, on=self.buttons, margins=0, spacing=SPACING_PX)
@@ -266,131 +285,61 @@ def _look(
     return shots, other_board(shots, board)
 
 
-_COLUMNS = {
-    tr("Image"): tr("Unticked images are excluded; tick them to include them again."),
-    tr("Corners"): tr("Number of board corners found in each camera's image."),
-    tr("RMS, px"): tr(
-        "Root mean square distance between detected and expected corners, after solving."
-    ),
-    tr("Tilt"): tr("Angle between the board's normal and the line of sight, after solving."),
-    tr("Note"): tr("Why no board was found, or what is wrong with the worst image."),
+def _corners(shot: Shot, _solved: SolvedPart) -> str:
+    return " · ".join(str(len(one.found.ids)) if one.found else UNKNOWN for one in shot.views)
+
+
+def _rms(shot: Shot, solved: SolvedPart) -> str:
+    rms_px = solved.residuals_px.get(shot.name)
+    return UNKNOWN if rms_px is None else f"{rms_px:.2f}"
+
+
+def _tilt(shot: Shot, solved: SolvedPart) -> str:
+    tilt_rad = solved.tilts_rad.get(shot.name)
+    return UNKNOWN if tilt_rad is None else f"{np.degrees(tilt_rad):.0f}°"
+
+
+def _note(shot: Shot, solved: SolvedPart) -> str:
+    if shot.problem:
+        return f"⚠ {sentence(shot.problem)}"
+    # Of a pair, the worst is named after one image: "headset camera's of NAME".
+    worst = solved.worst
+    is_worst = worst is not None and worst.name.endswith(shot.name)
+    return tr("Worst: {}").format(worst.why) if worst and is_worst else ""
+
+
+_SHOWN: dict[Column, Callable[[Shot, SolvedPart], str]] = {
+    Column(
+        tr("Image"),
+        tr("Unticked images are excluded; tick them to include them again."),
+        is_number=False,
+    ): lambda shot, _: shot.name,
+    Column(tr("Corners"), tr("Number of board corners found in each camera's image.")): _corners,
+    Column(
+        tr("RMS, px"),
+        tr("Root mean square distance between detected and expected corners, after solving."),
+    ): _rms,
+    Column(
+        tr("Tilt"),
+        tr("Angle between the board's normal and the line of sight, after solving."),
+    ): _tilt,
+    Column(
+        tr("Note"),
+        tr("Why no board was found, or what is wrong with the worst image."),
+        is_number=False,
+        is_rest=True,
+    ): _note,
 }
-_IMAGE, _CORNERS, _OFF, _TILT, _NOTE = range(5)
+"""The columns of the list of images, with the text of each image."""
+_PICTURE_PX = QSize(6 * SPACING_PX, 4 * SPACING_PX)
+_UNSOLVED = SolvedPart(CalibrationVerdict("bad", ""), (), {})
 
 
-class ShotList(QTreeWidget):
-    """Lists shots, each with a check box to use or exclude it.
-
-    Attributes
-    ----------
-    chosen : Signal(int)
-        Index of the newly selected shot.
-    dropped_changed : Signal()
-    """
-
-    chosen = Signal(int)
-    dropped_changed = Signal()
-
-    def __init__(self, name: str, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.setObjectName("shots")
-        self.setAccessibleName(name)
-        self.setRootIsDecorated(False)
-        self.setAlternatingRowColors(True)
-        self.setIconSize(QSize(6 * SPACING_PX, 4 * SPACING_PX))
-        self.setHeaderLabels(list(_COLUMNS))
-        for column, tooltip in enumerate(_COLUMNS.values()):
-            self.headerItem().setToolTip(column, tooltip)
-        flat_header(self.header())
-        self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        self.header().setSectionResizeMode(_NOTE, QHeaderView.ResizeMode.Stretch)
-        self.setMinimumSize(34 * SPACING_PX, 12 * SPACING_PX)
-        self._shots: tuple[Shot, ...] = ()
-        self.currentItemChanged.connect(lambda: self.chosen.emit(self.currentIndex().row()))
-        self.itemChanged.connect(self._on_item_changed)
-        follow_theme(self, self._mark_all)
-
-    @property
-    def dropped(self) -> tuple[str, ...]:
-        """Names of the unticked shots."""
-        unchecked = Qt.CheckState.Unchecked
-        return tuple(
-            shot.name for item, shot in self._rows() if item.checkState(_IMAGE) is unchecked
-        )
-
-    def show_shots(self, shots: Sequence[Shot], dropped: Iterable[str], note: str = "") -> None:
-        """Replace the list; a note stands in place of each problem if it explains all of them."""
-        out = frozenset(dropped)
-        self._shots = tuple(shots)
-        self.blockSignals(True)
-        self.clear()
-        self.addTopLevelItems(
-            [_item(shot, shot.name in out, note or shot.problem) for shot in shots]
-        )
-        self._mark_all()
-        self.blockSignals(False)
-        if (first := self.topLevelItem(0)) is not None:
-            self.setCurrentItem(first)
-
-    def show_results(
-        self,
-        residuals_px: Mapping[str, float],
-        tilts_rad: Mapping[str, float],
-        worst: tuple[str, str] = ("", ""),
-    ) -> None:
-        """Show residual and tilt of each, and mark the worst with the reason."""
-        self.blockSignals(True)
-        for item, shot in self._rows():
-            off, tilt = residuals_px.get(shot.name), tilts_rad.get(shot.name)
-            item.setText(_OFF, UNKNOWN if off is None else f"{off:.2f}")
-            item.setText(_TILT, UNKNOWN if tilt is None else f"{np.degrees(tilt):.0f}°")
-            # Of a pair, the worst is named after one image: "headset camera's of NAME".
-            is_worst = worst[0].endswith(shot.name)
-            _note(item, shot.problem or (tr("worst: {}").format(worst[1]) if is_worst else ""))
-        self.blockSignals(False)
-
-    def sizeHint(self) -> QSize:
-        """Return the size at which there is room for notes."""
-        return QSize(60 * SPACING_PX, super().sizeHint().height())
-
-    def _on_item_changed(self, _item: QTreeWidgetItem, column: int) -> None:
-        if column == _IMAGE:
-            self.dropped_changed.emit()
-
-    def _mark_all(self) -> None:
-        for item, shot in self._rows():
-            if shot.problem:
-                item.setIcon(_NOTE, QIcon(icon("warning").pixmap(2 * SPACING_PX)))
-
-    def _rows(self) -> list[tuple[QTreeWidgetItem, Shot]]:
-        items = (self.topLevelItem(row) for row in range(self.topLevelItemCount()))
-        return [(item, shot) for item, shot in zip(items, self._shots, strict=False) if item]
-
-
-def _item(shot: Shot, is_dropped: bool, note: str) -> QTreeWidgetItem:
-    counts = (str(len(view.found.ids)) if view.found else UNKNOWN for view in shot.views)
-    item = QTreeWidgetItem([shot.name, " · ".join(counts), UNKNOWN, UNKNOWN])
-    checked = Qt.CheckState.Unchecked if is_dropped else Qt.CheckState.Checked
-    item.setCheckState(_IMAGE, checked)
-    item.setToolTip(_IMAGE, shot.name)
-    if shot.small is not None:
-        item.setIcon(_IMAGE, _picture(shot.small))
-    for column in (_CORNERS, _OFF, _TILT):
-        item.setTextAlignment(column, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        item.setFont(column, number_font())
-    _note(item, note)
-    return item
-
-
-def _note(item: QTreeWidgetItem, note: str) -> None:
-    item.setText(_NOTE, sentence(note))
-    item.setToolTip(_NOTE, sentence(note))
-
-
-def _picture(image: UInt8) -> QIcon:
+def _picture(image: UInt8) -> QPixmap:
     height, width = image.shape[:2]
     shown = QImage(image.data, width, height, 3 * width, QImage.Format.Format_RGB888)
-    return QIcon(QPixmap.fromImage(shown.copy()))
+    keep, smooth = Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
+    return QPixmap.fromImage(shown.copy()).scaled(_PICTURE_PX, keep, smooth)
 
 
 _ARM = 0.006  # of a corner's cross, relative to the image's width

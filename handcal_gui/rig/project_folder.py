@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 from typing import Literal, TypeAlias
 
+from handcal.core.entry import INTRINSICS_FILES, entry
 from handcal.core.errors import FileError
 from handcal.core.types import Rig
 from handcal.io.files import make_folder, read_json, user_path, write_json
@@ -16,29 +17,70 @@ from handcal.io.resources import resource_path
 from handcal.io.settings import read_settings, settings_json
 from handcal.rig.boards.board import Board
 from handcal.rig.boards.printing import Paper
+from handcal.rig.formats import read_camera, read_intrinsics, read_pose
 from handcal.rig.lens.camera import LensChoice
 from handcal.rig.rig_file import read_rig, write_rig
-from handcal.rig.steps import DisplayInputs
+from handcal.rig.steps import DisplayInputs, view_in
 from handcal_gui.app.translation import tr
 
 Distance: TypeAlias = Literal["measured", "solved"]
+LENSES: dict[LensChoice, str] = {
+    "auto": tr("The one that fits best"),
+    "none": tr("No distortion"),
+    "radial": "k1, k2",
+    "full": "k1, k2, p1, p2, k3",
+    "rational": tr("k1 to k6, p1, p2"),
+    "fisheye": tr("Fisheye"),
+}
+_SOLVED = tr("Solved from the images")
+_FORMATS = tr("As OpenCV, ROS, Kalibr, RealSense, Open3D, Azure Kinect or handcal write them.")
+_IMAGER_HELP = tr(
+    "Needed only if the images come from a colour imager beside the depth imager and the depth is "
+    "not aligned to it. Take images… reads them from a RealSense."
+)
+
+
+def _images(label: str) -> str:
+    return entry("", label, path="folder")
+
+
+def _intrinsics(
+    label: str, read: Callable[[Path], object], help_text: str = _FORMATS, hint: str = _SOLVED
+) -> str:
+    return entry("", label, help_text, hint=hint, path="file", files=INTRINSICS_FILES, read=read)
+
+
+def _lens() -> LensChoice:
+    told = tr("Distortion coefficients to solve for.")
+    lens: LensChoice = entry("auto", tr("L&ens"), told, options=LENSES)
+    return lens
 
 
 @dataclass(frozen=True, slots=True)
 class StereoEntries:
     """Inputs for the depth camera's pose; missing paths are empty."""
 
-    depth_images: str = ""
-    headset_images: str = ""
+    depth_images: str = _images(tr("&Depth camera's images"))
+    headset_images: str = _images(tr("&Headset camera's images"))
     """Folders of the two cameras' images."""
-    depth_intrinsics: str = ""
-    headset_intrinsics: str = ""
+    depth_intrinsics: str = _intrinsics(tr("Depth camera's in&trinsics"), read_camera)
+    headset_intrinsics: str = _intrinsics(tr("Headset camera's intrinsi&cs"), read_camera)
     """Files of intrinsics; solved from the images if empty."""
-    imager_intrinsics: str = ""
-    depth_to_color: str = ""
+    imager_intrinsics: str = _intrinsics(
+        tr("Depth ima&ger's intrinsics"), read_intrinsics, _IMAGER_HELP, tr("Not needed")
+    )
+    depth_to_color: str = entry(
+        "",
+        tr("Pose &from depth to colour"),
+        _IMAGER_HELP,
+        hint=tr("Not needed"),
+        path="file",
+        files=tr("Poses (*.yaml *.yml *.json)"),
+        read=read_pose,
+    )
     """Files with the depth imager's intrinsics and its pose in the colour imager, if the images
     come from the colour imager."""
-    lens: LensChoice = "auto"
+    lens: LensChoice = _lens()
     """Lens model for solved intrinsics."""
     dropped: tuple[str, ...] = ()
     """Excluded images, by the depth camera's file name."""
@@ -48,9 +90,9 @@ class StereoEntries:
 class ViewpointEntries:
     """Inputs for the viewpoint camera's intrinsics, or a file that contains them."""
 
-    images: str = ""
-    intrinsics: str = ""
-    lens: LensChoice = "auto"
+    images: str = _images(tr("&Viewpoint camera's images"))
+    intrinsics: str = _intrinsics(tr("Viewpoint camera's in&trinsics"), read_intrinsics)
+    lens: LensChoice = _lens()
     dropped: tuple[str, ...] = ()
 
 
@@ -58,23 +100,82 @@ class ViewpointEntries:
 class DisplayEntries:
     """Inputs for one eye's display calibration."""
 
-    grid_images: str = ""
+    grid_images: str = _images(tr("Images of t&he grid"))
     """Folder of images of the grid on the display."""
-    square_px: int = 80
+    square_px: int = entry(
+        80,
+        tr("Grid s&quares"),
+        tr("Side length of the grid's squares, in pixels."),
+        limits=(20, 2000),
+    )
     """Side length of the grid's squares."""
-    board_images: str = ""
-    tracked: str = ""
+    board_images: str = _images(tr("Images o&f the board"))
+    tracked: str = entry(
+        "",
+        tr("&Poses of the board"),
+        tr("Poses of the board as tracked by the headset, for each image: {}, in metres.").format(
+            '{"handcal_tracked": 1, "T_H_B": {"image.png": [4 rows of 4]}}'
+        ),
+        path="file",
+        files=tr("Tracked poses (*.json)"),
+    )
     """Folder of images of the tracked board, and file of its poses."""
-    stereo: str = ""
+    stereo: str = entry(
+        "",
+        tr("S&tereo calibration"),
+        tr(
+            "Instead of images and poses of the board: the result of 'handcal rig stereo' with the "
+            "viewpoint camera as depth camera."
+        ),
+        hint=tr("Instead of the images of the board"),
+        path="file",
+        files=tr("Stereo calibrations (*.json)"),
+    )
     """Alternative to both: the JSON file of a stereo calibration with the viewpoint camera as
     depth camera."""
-    view: str = ""
+    view: str = entry(
+        "",
+        tr("R&endering camera's pose"),
+        tr(
+            "Transform from the headset rig to this eye's rendering camera, T_V_H, as the headset "
+            "reports it: 4 rows of 4 numbers, in metres; x right, y down, z forward. If empty, "
+            "that of the initial rig is used."
+        ),
+        hint=tr("As in the rig"),
+        path="file",
+        files=tr("Matrices (*.txt *.json *.yaml *.yml)"),
+        read=view_in,
+    )
     """File of T_V_H as reported by the headset; that of the rig if empty."""
-    distance: Distance = "measured"
+    distance: Distance = entry(
+        "measured",
+        tr("S&creen's distance"),
+        tr(
+            "Distance of the virtual screen from the viewpoint camera, z(C0→S): measured, for "
+            "example by the camera's focus, or solved from the angle that a square subtends at the "
+            "nominal distance."
+        ),
+        options={"measured": tr("measured"), "solved": tr("from the squares' angle")},
+    )
     """Source of z(C0→S): `distance_m`, or the angle that a square subtends."""
-    distance_m: float = 2.0
-    square_arcmin: float = 112.0
-    nominal_m: float = 2.0
+    distance_m: float = entry(
+        2.0,
+        tr("Me&asured distance"),
+        tr("Measured distance of the virtual screen, in metres."),
+        limits=(0.1, 100.0),
+    )
+    square_arcmin: float = entry(
+        112.0,
+        tr("An&gle of a square"),
+        tr("Angle that a square of the grid subtends, in arcminutes."),
+        limits=(1.0, 1e4),
+    )
+    nominal_m: float = entry(
+        2.0,
+        tr("Nominal &distance"),
+        tr("Nominal distance for this angle, from the manufacturer, in metres."),
+        limits=(0.1, 100.0),
+    )
     """The measured distance; the angle that a square subtends at the nominal distance."""
     dropped_grid: tuple[str, ...] = ()
     dropped_board: tuple[str, ...] = ()

@@ -5,23 +5,21 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QHideEvent, QIcon
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QHideEvent, QPixmap
 from PySide6.QtWidgets import (
-    QAbstractItemView,
     QFormLayout,
     QHBoxLayout,
-    QHeaderView,
     QLineEdit,
     QMessageBox,
-    QTableWidget,
-    QTableWidgetItem,
     QTabWidget,
     QWidget,
 )
 
+from handcal.core.entry import RIG_FILES
 from handcal.core.errors import FileError, HandcalError
 from handcal.core.types import PART_NAMES, RIG_PARTS, Rig
 from handcal.io.files import user_path
@@ -29,7 +27,7 @@ from handcal.rig.findings import RigFinding, report_rig
 from handcal.rig.plausible import MAX_NAME
 from handcal.rig.rig_file import read_rig
 from handcal.station.checks.doctor import Finding, Health
-from handcal_gui.app.theme import SPACING_PX, colors, flat_header, follow_theme, icon
+from handcal_gui.app.theme import SPACING_PX, colors, follow_theme, icon
 from handcal_gui.app.translation import tr
 from handcal_gui.rig.accept_dialog import AcceptDialog
 from handcal_gui.rig.file_dialogs import ask_save
@@ -49,17 +47,14 @@ from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.path_field import PathField
 from handcal_gui.widgets.sentence import sentence
-from handcal_gui.widgets.table import Table
+from handcal_gui.widgets.table import Column, Row, Table
 from handcal_gui.widgets.times import local_time
 
-_RIG_FILES = tr("Rig files (*.yaml *.yml)")
 _CHECKS = "docs/tutorial.md#7-check-depth-and-displays"
 _HOW = tr(
     "The depth and the displays are checked outside this window: "
     '<a href="{}">how to check them</a>.'
 )
-_FOUND, _EXPECTED = 1, 2
-_WIDEST_PX = 45 * SPACING_PX
 _TIME = re.compile(r"\d{4}-\d\d-\d\dT[\d:.]+(\+\d\d:\d\d|Z)?")
 """ISO 8601."""
 
@@ -92,11 +87,12 @@ class ResultPage(QWidget):
         self._name_problem = paragraph(
             "rigNameProblem", tr("Enter a name of printable characters, to save the rig.")
         )
-        self._findings = _findings_table()
+        self._findings = Table("rigFindings", tr("Check of the rig"), wraps=True)
+        self._findings.setIconSize(QSize(2 * SPACING_PX, 2 * SPACING_PX))
         self._how = make_linked(paragraph("howToCheck", _HOW.format(_CHECKS)))
         self._how.linkActivated.connect(read)
         self._numbers = Table("numbers-of-the-rig", tr("Numbers of the rig"))
-        self._other = PathField(tr("Rig file to compare with"), "file", _RIG_FILES)
+        self._other = PathField(tr("Rig file to compare with"), "file", RIG_FILES)
         self._differences = Table("differences", tr("Differences"))
         self._compared = FindingLine("compared")
         self._end = FindingLine("savedRig")
@@ -148,7 +144,7 @@ class ResultPage(QWidget):
         """Choose a path and save the rig file."""
         plain = re.sub(r"[^A-Za-z0-9]+", "-", self._name.text()).strip("-").lower()
         proposed = f"{plain or 'rig'}.yaml"
-        path = ask_save(self._project, self, tr("Save the rig file"), proposed, _RIG_FILES)
+        path = ask_save(self._project, self, tr("Save the rig file"), proposed, RIG_FILES)
         if path and self._confirm_mixed():
             self.save_as(path)
 
@@ -170,18 +166,24 @@ class ResultPage(QWidget):
     def _show_findings(self) -> None:
         """Show the findings: failed and doubtful ones come first, then what is not known."""
         shown = sorted(self._shown, key=lambda one: (not one.has_failed, one.is_fine, one.is_known))
-        table = self._findings
-        table.setRowCount(len(shown))
-        for row, one in enumerate(shown):
+        is_fine = all(one.is_fine for one in shown)
+        expected = () if is_fine else (Column(tr("Expected"), is_number=False),)
+        columns = (
+            Column(tr("Item"), is_number=False),
+            Column(tr("Found"), is_number=False, is_rest=True),
+            *expected,
+        )
+        rows = []
+        for one in shown:
             found = _TIME.sub(lambda time: local_time(time[0]), one.found)
-            expected = "" if one.is_fine else one.expected
-            items = [QTableWidgetItem(sentence(text)) for text in (one.what, found, expected)]
-            for column, item in enumerate(items):
-                table.setItem(row, column, item)
+            cells = [
+                sentence(text) for text in (one.what, found, "" if one.is_fine else one.expected)
+            ]
             sign, shade, word = _sign(one)
-            items[0].setIcon(icon(sign, getattr(colors(), shade)) if sign else QIcon())
-            items[0].setData(Qt.ItemDataRole.AccessibleDescriptionRole, word)
-        table.setColumnHidden(_EXPECTED, all(one.is_fine for one in shown))
+            picture = partial(_picture, sign, shade) if sign else None
+            row = Row("", tuple(cells[: len(columns)]), picture=picture, picture_text=word)
+            rows.append(row)
+        self._findings.show_rows(columns, rows)
 
     def _outdated(self) -> list[RigFinding]:
         """Return the steps that were solved with other inputs than the present ones."""
@@ -280,21 +282,8 @@ class ResultPage(QWidget):
         vbox(form, (tabs, 1), foot, on=self, margins=0, spacing=SPACING_PX)
 
 
-def _findings_table() -> QTableWidget:
-    table = with_name(QTableWidget(0, 3), "rigFindings", tr("Check of the rig"))
-    table.setHorizontalHeaderLabels([tr("Item"), tr("Found"), tr("Expected")])
-    table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-    table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
-    table.setTabKeyNavigation(False)
-    table.setAlternatingRowColors(True)
-    table.setShowGrid(False)
-    table.verticalHeader().hide()
-    table.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-    flat_header(table.horizontalHeader())
-    table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-    table.horizontalHeader().setSectionResizeMode(_FOUND, QHeaderView.ResizeMode.Stretch)
-    table.horizontalHeader().setMaximumSectionSize(_WIDEST_PX)
-    return table
+def _picture(sign: str, shade: str) -> QPixmap:
+    return icon(sign, getattr(colors(), shade)).pixmap(2 * SPACING_PX)
 
 
 def _sign(finding: RigFinding) -> tuple[str, str, str]:

@@ -14,7 +14,7 @@ from handcal.rig.lens.camera import CameraCalibration
 from handcal.rig.lens.stereo import StereoCalibration
 from handcal.rig.steps import STEREO_PARAMETERS
 from handcal_gui.app.translation import tr
-from handcal_gui.rig.lens_fields import LENSES
+from handcal_gui.rig.project_folder import LENSES
 from handcal_gui.widgets.number_label import UNKNOWN
 from handcal_gui.widgets.sentence import sentence
 from handcal_gui.widgets.table import Row

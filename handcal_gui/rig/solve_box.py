@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 from PySide6.QtCore import Signal
@@ -20,7 +19,6 @@ from handcal_gui.widgets.fields import main_button, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, vbox
-from handcal_gui.widgets.sentence import sentence
 from handcal_gui.widgets.table import Table
 from handcal_gui.widgets.times import local_time
 
@@ -93,10 +91,7 @@ class SolveBox(QWidget):
     def show_finding(self, finding: Finding) -> None:
         """Show a message about the result, followed by what is needed to solve."""
         self._shown = finding
-        parts = finding.advice.rstrip("."), sentence(self._need)
-        advice = ". ".join(part for part in parts if part)
-        is_waiting = finding is _NOT_YET
-        self._verdict.show_finding(replace(finding, advice=advice), is_waiting=is_waiting)
+        self._verdict.show_finding(finding, is_waiting=finding is _NOT_YET, need=self._need)
 
     def allow(self, need: str, *, is_busy: bool) -> None:
         """Enable the button, unless something is needed first, or being done."""

@@ -10,9 +10,17 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Literal, TypeAlias
 
+from handcal.core.entry import entries_of
 from handcal.io.images import IMAGE_SUFFIXES
 from handcal_gui.app.translation import tr
-from handcal_gui.rig.project_folder import RigInputs, entered_path
+from handcal_gui.rig.project_folder import (
+    DisplayEntries,
+    RigInputs,
+    StereoEntries,
+    ViewpointEntries,
+    entered_path,
+)
+from handcal_gui.widgets.sentence import lowered
 
 Step: TypeAlias = Literal["T_H_D", "viewpoint", "left", "right"]
 """A step that is solved: a part of the rig, or the viewpoint camera's intrinsics."""
@@ -25,27 +33,12 @@ STEP_TITLES: dict[Step, str] = {
 _NAMES = {
     "board": tr("board"),
     "camera": tr("viewpoint camera's intrinsics"),
-    "depth_images": tr("depth camera's images"),
-    "headset_images": tr("headset camera's images"),
-    "depth_intrinsics": tr("depth camera's intrinsics"),
-    "headset_intrinsics": tr("headset camera's intrinsics"),
-    "imager_intrinsics": tr("depth imager's intrinsics"),
-    "depth_to_color": tr("pose from depth to colour"),
-    "lens": tr("lens"),
-    "images": tr("viewpoint camera's images"),
-    "grid_images": tr("images of the grid"),
-    "square_px": tr("grid squares"),
-    "board_images": tr("images of the board"),
-    "tracked": tr("poses of the board"),
-    "stereo": tr("stereo calibration"),
-    "view": tr("rendering camera's pose"),
-    "distance": tr("screen's distance"),
-    "distance_m": tr("measured distance"),
-    "square_arcmin": tr("angle of a square"),
-    "nominal_m": tr("nominal distance"),
-    "dropped": tr("excluded images"),
-    "dropped_grid": tr("excluded images"),
-    "dropped_board": tr("excluded images"),
+    **{
+        name: lowered(told.title)
+        for kind in (StereoEntries, ViewpointEntries, DisplayEntries)
+        for name, (told, _) in entries_of(kind).items()
+    },
+    **dict.fromkeys(("dropped", "dropped_grid", "dropped_board"), tr("excluded images")),
 }
 
 

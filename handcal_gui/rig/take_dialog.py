@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import cast
 
-from PySide6.QtCore import QSize, Signal
-from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QCheckBox, QDialog, QLabel, QWidget
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QLabel, QWidget
 
 from handcal.camera.settings import RealSenseSettings
 from handcal.camera.take_board import are_kept, keep_imager, keep_images, see_board
@@ -22,25 +20,21 @@ from handcal.rig.boards.views import ASKED_VIEWS, BoardImage, board_image, cover
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
-from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.rig.maps import HEAD_PX, CoverageMap
-from handcal_gui.widgets.action_strip import one_of_strips
-from handcal_gui.widgets.fields import button, main_button, one_of, with_name
-from handcal_gui.widgets.finding_line import FindingLine
-from handcal_gui.widgets.job_bar import JobBar
+from handcal_gui.widgets.fields import paragraph, with_name
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.widgets.live_images import Images
 from handcal_gui.widgets.sentence import sentence
+from handcal_gui.widgets.taking import TakingDialog
 
 _TAKEN = tr("this has been taken already")
 
-_FIRST_SIZE, _FRAME = QSize(1240, 760), QSize(SPACING_PX, 6 * SPACING_PX)
 _MAP_PX = 12 * SPACING_PX
 """Height of a map: the images need the room, and the digits remain legible."""
 
 
-class TakeDialog(QDialog):
+class TakeDialog(TakingDialog):
     """Shows live images of one or two cameras, and takes images with all of them at once.
 
     Parameters
@@ -84,12 +78,22 @@ class TakeDialog(QDialog):
         open_source: Callable[..., ViewpointCamera] = open_view_source,
         list_cameras: Callable[[], list[int]] = list_viewpoints,
     ) -> None:
-        super().__init__(parent)
-        self.setObjectName("takeDialog")
-        self.setWindowTitle(tr("Take images"))
+        cameras = LiveCameras(
+            tuple(folders),
+            realsense,
+            lambda title, frame, identity: keep_imager(folders[title], frame, identity),
+            open_source,
+        )
+        help_text = tr(
+            "Take an image whenever the board is at rest, sharp, and at a position not covered by "
+            "earlier images."
+        )
+        super().__init__(
+            *("takeDialog", tr("Take images"), cameras, help_text),
+            *(self._keep_if_new, self._show_judged, parent),
+        )
         self._folders, self._board, self._choose = dict(folders), board, choose
         self._selector, self._kept = self._new_selector(), 0
-        self._is_searching = False
         self._asked, self._seen = asked, list(earlier)
         self._count = with_name(QLabel(), "takenCount")
         self._kinds = with_name(QLabel(), "takenKinds")
@@ -100,55 +104,14 @@ class TakeDialog(QDialog):
             )
         )
         self._maps = tuple(CoverageMap(title) for title in folders)
-        self._cameras = LiveCameras(
-            tuple(folders),
-            realsense,
-            lambda title, frame, identity: keep_imager(folders[title], frame, identity),
-            open_source,
-        )
-        self._task = one_of(
-            {
-                "takeShow": self._show_task,
-                "takeTake": tr("Press Take while nothing moves. Close when there are enough."),
-                "takeWait": tr("Images are taken automatically. Close when there are enough."),
-            }
-        )
-        self._found = FindingLine("taken")
-        self._bar = JobBar()
-        self._start = main_button("startCameras", tr("&Show"))
-        self._take = main_button("takeImage", tr("Take"))
-        self._mains = one_of_strips(self._start, self._take, keys="Space")
-        self._by_itself = with_name(
-            QCheckBox(tr("Take &automatically when the board is still")),
-            "byItself",
-            help_text=tr(
-                "Take an image whenever the board is at rest, sharp, and at a position not covered "
-                "by earlier images."
-            ),
-        )
-        self._close = button("close", tr("&Close"))
-        self._search = LatestJob(self._keep_if_new, self)
-        self._search.answered.connect(self._on_searched)
-        self._search.failed.connect(self._show_failure)
-        self._cameras.images_changed.connect(self._follow)
-        self._cameras.chosen_changed.connect(self._refresh)
-        self._cameras.failed.connect(self._show_failure)
-        self._start.clicked.connect(self.start)
-        self._take.clicked.connect(self.take)
+        self._task = paragraph("takeTask")
+        cameras.chosen_changed.connect(self.refresh)
         self._by_itself.toggled.connect(self._reset)
-        self._by_itself.toggled.connect(self._refresh)
-        self._close.clicked.connect(self.accept)
-        self._bar.busy_changed.connect(self._refresh)
-        self._bar.failed.connect(self._show_failure)
         self._lay_out()
-        room = QGuiApplication.primaryScreen().availableSize() - _FRAME
-        self.resize(room.boundedTo(_FIRST_SIZE))
-        self._refresh()
+        self.refresh()
         self._show_coverage()
-        self._bar.run(
-            tr("Looking for cameras"), lambda *_: list_cameras(), self._cameras.add_cameras
-        )
-        self._cameras.choose(sources)
+        self._bar.run(tr("Looking for cameras"), lambda *_: list_cameras(), cameras.add_cameras)
+        cameras.choose(sources)
 
     @property
     def shown_images(self) -> Images | None:
@@ -157,9 +120,7 @@ class TakeDialog(QDialog):
 
     def start(self) -> None:
         """Show the images of the chosen cameras."""
-        self._stop_search()
-        self._found.clear()
-        self._cameras.start()
+        super().start()
         self.remembered.emit(self._cameras.chosen)
 
     def take(self) -> None:
@@ -179,23 +140,29 @@ class TakeDialog(QDialog):
 
         self._bar.run(tr("Looking for the board"), work, self._show_taken)
 
-    def done(self, result: int) -> None:
-        """Close the cameras and the dialog."""
-        self._stop_search()
-        self._cameras.stop()
-        self._bar.stop()
-        super().done(result)
+    def asked(self) -> Images | None:
+        """Return the present images."""
+        return self.shown_images
+
+    def refresh(self) -> None:
+        """Show what to do next."""
+        super().refresh()
+        self._start.setEnabled(not self._cameras.need)
+        task = tr("Press Take while nothing moves. Close when there are enough.")
+        if self.shown_images is None:
+            task = tr("Choose a camera or a recording, and press Show.")
+            if need := self._cameras.need:
+                task = f"{sentence(need)}."
+        elif self._by_itself.isChecked():
+            task = tr("Images are taken automatically. Close when there are enough.")
+        self._task.setText(task)
 
     def _reset(self) -> None:
-        self._stop_search()
+        self.stop_judging()
         self._selector, self._kept = self._new_selector(), 0
 
     def _new_selector(self) -> ViewSelector:
         return ViewSelector(self._choose, [title.lower() for title in self._folders])
-
-    def _stop_search(self) -> None:
-        self._search.stop()
-        self._is_searching = False
 
     def _keep_if_new(self, images: Images) -> tuple[str, Sequence[BoardView | None]]:
         """Save images if useful; return why not, and what they show. Runs in the job's thread."""
@@ -208,35 +175,20 @@ class TakeDialog(QDialog):
             keep_images(images, folders)
         return why_not, seen
 
-    def _on_searched(self, _images: Images, answer: tuple[str, Sequence[BoardView | None]]) -> None:
+    def _show_judged(self, _images: Images, answer: tuple[str, Sequence[BoardView | None]]) -> None:
         why_not, seen = answer
-        self._is_searching = False
         if not why_not:
             self._kept += 1
             self._add(seen)
         if self._selector.is_done:
             self._by_itself.setChecked(False)
-            finding = Finding(
-                "", Health.GOOD, tr("{} taken: enough images").format(self._choose.most)
-            )
+            told = tr("{} taken: enough images").format(self._choose.most)
+            finding = Finding("", Health.GOOD, told)
         elif why_not:
             finding = Finding("", Health.LIMITED, tr("{} taken; {}").format(self._kept, why_not))
         else:
             finding = Finding("", Health.GOOD, tr("{} taken").format(self._kept))
         self._found.show_finding(finding)
-
-    def _follow(self) -> None:
-        images = self.shown_images
-        if images is not None and self._by_itself.isChecked() and not self._is_searching:
-            self._is_searching = True
-            self._search.ask(images)
-        self._refresh()
-
-    def _show_failure(self, why: str) -> None:
-        self._stop_search()
-        self._cameras.stop()
-        advice = tr("press Show to open the cameras again")
-        self._found.show_finding(Finding("", Health.BROKEN, why, advice))
 
     def _show_taken(self, views: list[BoardImage]) -> None:
         problem = "; ".join(f"{view.name}: {view.problem}" for view in views if view.problem)
@@ -272,37 +224,18 @@ class TakeDialog(QDialog):
             text = tr("{} near, {} far, {} tilted").format(*kinds)
         self._kinds.setText(text)
 
-    @property
-    def _show_task(self) -> str:
-        """The task before the cameras are shown."""
-        if need := self._cameras.need:
-            return f"{sentence(need)}."
-        if len(self._folders) > 1:
-            return tr("Choose the cameras and press Show.")
-        return tr("Choose the camera and press Show.")
-
-    def _refresh(self) -> None:
-        is_shown = self.shown_images is not None
-        cast(QLabel, self._task.widget(0)).setText(self._show_task)
-        self._start.setEnabled(not self._cameras.need)
-        self._task.setCurrentIndex(1 + self._by_itself.isChecked() if is_shown else 0)
-        self._take.setEnabled(is_shown and not self._bar.is_busy)
-        self._mains.setCurrentIndex(int(is_shown))
-
     def _lay_out(self) -> None:
         covered = QLabel(tr("Covered so far:"))
         covered.setMinimumHeight(HEAD_PX)  # beside the captions of the maps
         count = hbox(self._count, self._kinds, 1, covered, spacing=2 * SPACING_PX)
         told = vbox(count, self._found, 1, spacing=SPACING_PX)
-        others = self._close, self._by_itself
-        foot = hbox(*others, (self._bar, 1), self._mains, spacing=SPACING_PX)
         for one in self._maps:
             one.setFixedHeight(_MAP_PX)
         vbox(
             self._task,
             (self._cameras, 1),
             hbox((told, 1), *self._maps, spacing=2 * SPACING_PX),
-            foot,
+            self._foot(),
             on=self,
             margins=2 * SPACING_PX,
             spacing=SPACING_PX,

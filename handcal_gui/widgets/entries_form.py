@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import reduce
 from typing import Any, NamedTuple, TypeVar, cast
@@ -18,35 +18,47 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from handcal.core.entry import Entry, entries_of
 from handcal_gui.app.theme import SPACING_PX
-from handcal_gui.widgets.fields import label_for, make_equally_wide
+from handcal_gui.app.translation import tr
+from handcal_gui.widgets.fields import (
+    choice,
+    label_for,
+    make_equally_wide,
+    number,
+    whole_number,
+    with_name,
+)
 from handcal_gui.widgets.path_field import PathField
 
 Entries = TypeVar("Entries")
 
 
 class EntriesForm(QWidget):
-    """Shows fields of a dataclass: paths, choices, check boxes, texts and numbers.
+    """A row for each field of a dataclass that has an `Entry`.
 
     Parameters
     ----------
-    fields : mapping of str to (str, QWidget)
-        Label and widget of each field of the dataclass.
+    kind : type
+        The dataclass.
+    names : sequence of str
+        The fields shown, in this order; default: all.
     """
 
     def __init__(
-        self, fields: Mapping[str, tuple[str, QWidget]], parent: QWidget | None = None
+        self, kind: type, names: Sequence[str] = (), parent: QWidget | None = None
     ) -> None:
         super().__init__(parent)
-        self._fields = {name: field for name, (_, field) in fields.items()}
+        entries = entries_of(kind)
+        self._fields = {name: _field(name, *entries[name]) for name in names or entries}
         self._bound = Bound(self._fields, parent=self)
         make_equally_wide(one for one in self._fields.values() if isinstance(one, QSpinBox))
         form = QFormLayout(self)
         form.setContentsMargins(0, 0, 0, 0)
         form.setHorizontalSpacing(SPACING_PX)
         form.setVerticalSpacing(SPACING_PX // 2)
-        for text, field in fields.values():
-            form.addRow(label_for(field, text), field)
+        for name, field in self._fields.items():
+            form.addRow(label_for(field, tr(entries[name][0].label)), field)
 
     @property
     def changed(self) -> SignalInstance:
@@ -57,6 +69,10 @@ class EntriesForm(QWidget):
         """Show the fields' values."""
         self._bound.show(entries)
 
+    def field(self, name: str) -> QWidget:
+        """Return the widget of a field."""
+        return self._fields[name]
+
     def enter(self, **values: object) -> None:
         """Show other values of some fields, as if typed."""
         for name, value in values.items():
@@ -65,6 +81,35 @@ class EntriesForm(QWidget):
     def take(self, entries: Entries) -> Entries:
         """Return the entered values."""
         return self._bound.take(entries)
+
+
+_UNITS = {"_px": (" px", 1.0), "_m": (" m", 0.01), "_arcmin": ("′", 0.1)}
+"""A number's unit as shown, and the step of its arrows, by the end of its field's name."""
+
+
+def _field(name: str, entry: Entry, kind: object) -> QWidget:
+    """Return the widget of a field, by its type."""
+    unit, step = next((one for end, one in _UNITS.items() if name.endswith(end)), ("", 0.01))
+    title, help_text, hint = tr(entry.title), tr(entry.help), tr(entry.hint)
+    if entry.path:
+        path = PathField(title, entry.path, tr(entry.files), hint, read=entry.read)
+        path.setToolTip(help_text)
+        return path
+    if entry.options is not None:
+        texts = {option: tr(text) for option, text in entry.options.items()}
+        return choice(name, title, texts, help_text)
+    if kind is bool:
+        return with_name(QCheckBox(hint), name, title, help_text)
+    if kind is float:
+        return number(name, *entry.limits, step, unit, help_text)
+    if kind is int:
+        low, high = map(int, entry.limits)
+        whole = whole_number(name, low, high, help_text)
+        whole.setSuffix(unit)
+        whole.setSpecialValueText(hint)
+        return whole
+    line = QLineEdit(placeholderText=hint, clearButtonEnabled=bool(hint))
+    return with_name(line, name, title, help_text)
 
 
 class Bound(QObject):

@@ -64,15 +64,16 @@ class FindingLine(QWidget):
         mend: Callable[[], object] | None = None,
         *,
         is_waiting: bool = False,
+        need: str = "",
     ) -> None:
         """Show a finding; `fix` labels the button that calls `mend`.
 
-        If it waits only for a later step, a clock stands in place of the sign of its health.
+        If it waits only for a later step, a clock stands in place of the sign of its health. Its
+        advice is followed by what is needed first.
         """
         self._finding, self._mend, self._is_waiting = finding, mend, is_waiting
-        self._text.setText(
-            " ".join(map(_full_sentence, filter(None, (finding.found, finding.advice))))
-        )
+        parts = filter(None, (finding.found, finding.advice, need))
+        self._text.setText(" ".join(map(_full_sentence, parts)))
         self._button.setText(fix)
         self._button.setVisible(bool(fix))
         self._refresh()

@@ -82,8 +82,7 @@ class JobBar(QWidget):
         self._job.progressed.connect(self._show_progress)
         self._job.succeeded.connect(self._succeed)
         self._job.failed.connect(self._fail)
-        self._job.cancelled.connect(self._end)
-        self._job.cancelled.connect(self.cancelled)
+        self._job.cancelled.connect(self._end_cancelled)
         self._doing.setText(f"{doing}…")
         self._bar.setRange(0, 0)  # busy indicator until a share is reported
         self._job.start()
@@ -125,6 +124,10 @@ class JobBar(QWidget):
     def _fail(self, why: str) -> None:
         self._end()
         self.failed.emit(why)
+
+    def _end_cancelled(self) -> None:
+        self._end()
+        self.cancelled.emit()
 
     def _end(self) -> None:
         assert self._job is not None

@@ -89,13 +89,9 @@ class LiveCameras(QWidget):
         self._views = {title: ImageView(title) for title in titles}
         self._timer = QTimer(self, interval=_POLL_MS)
         self._timer.timeout.connect(self._poll)
-        for source in self._sources.values():
-            source.currentIndexChanged.connect(self._refresh)
-            source.currentIndexChanged.connect(self._stop_another)
-            source.currentIndexChanged.connect(self.chosen_changed)
-        for field in self._recorded.values():
-            field.changed.connect(self._stop_another)
-            field.changed.connect(self.chosen_changed)
+        for title in titles:
+            self._sources[title].currentIndexChanged.connect(self._follow_choice)
+            self._recorded[title].changed.connect(self._follow_choice)
         self._lay_out()
         self._refresh()
         self._show_message(tr("The camera's image will be shown here."))
@@ -183,10 +179,12 @@ class LiveCameras(QWidget):
             return tr("both are the same camera: choose another for one of them")
         return ""
 
-    def _stop_another(self) -> None:
+    def _follow_choice(self) -> None:
         """Stop once another camera is chosen than the one shown."""
+        self._refresh()
         if self._live is not None and self.chosen != self._opened:
             self.stop()
+        self.chosen_changed.emit()
 
     def _source(self, title: str) -> str:
         """Return a camera's source for `open_view_source`; empty if no recording is chosen."""

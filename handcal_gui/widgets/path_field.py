@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Literal
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt, SignalInstance
 from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QFileDialog,
@@ -22,8 +22,6 @@ from handcal_gui.app.keys import native
 from handcal_gui.app.translation import tr
 from handcal_gui.widgets.fields import button, fill_row, plain_tooltip
 
-INTRINSICS_FILES = tr("Intrinsics (*.yaml *.yml *.xml *.json)")
-"""File filter for a camera's intrinsics."""
 _KEY = "F4"
 """Opens the dialog of the field that has the focus, as it opens a list."""
 
@@ -47,10 +45,7 @@ class PathField(QWidget):
     Attributes
     ----------
     name : str
-    changed : Signal()
     """
-
-    changed = Signal()
 
     def __init__(
         self,
@@ -70,7 +65,6 @@ class PathField(QWidget):
         self._line = QLineEdit(placeholderText=empty, clearButtonEnabled=bool(empty))
         self._line.setAccessibleName(name)
         self._line.textChanged.connect(self._show_whole_path)
-        self._line.textChanged.connect(self.changed)
         buttons: list[QPushButton] = []
         for one, title, ask in (
             ("file", tr("File…"), self.choose_file),
@@ -88,6 +82,11 @@ class PathField(QWidget):
                 shortcut.activated.connect(ask)
         fill_row(self, self._line, *buttons, grows=self._line)
         self.setFocusProxy(self._line)
+
+    @property
+    def changed(self) -> SignalInstance:
+        """The signal of another path."""
+        return self._line.textChanged
 
     @property
     def path(self) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Hashable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
 from PySide6.QtCore import (
@@ -43,6 +43,8 @@ class Column:
     is_number: bool = True
     rank: int = 0
     """Columns of the highest rank are left out first if not all fit; those of rank 0 never."""
+    is_rest: bool = False
+    """It takes all the room that the others leave, be it more or less than its texts need."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +63,8 @@ class Row:
     picture: Callable[[], QPixmap] | None = None
     picture_text: str = ""
     """Stands before the first cell, and says the same for screen readers."""
+    is_ticked: bool | None = None
+    """Of a box before the first cell; None if there is none."""
 
 
 class _Model(QAbstractTableModel):
@@ -72,6 +76,7 @@ class _Model(QAbstractTableModel):
         self.texts: list[tuple[str, ...]] = []
         self.hidden: list[int] = []
         self.order: tuple[int, Qt.SortOrder] | None = None
+        self.tick: Callable[[Any, bool], object] = lambda _key, _is_ticked: None
         self._font = number_font()
 
     def replace(self, columns: Sequence[Column], rows: Iterable[Row]) -> None:
@@ -115,6 +120,8 @@ class _Model(QAbstractTableModel):
                 return texts[place] if place < len(texts) else ""
             case Qt.ItemDataRole.DecorationRole if place == 0 and row.picture:
                 return row.picture()
+            case Qt.ItemDataRole.CheckStateRole if place == 0 and row.is_ticked is not None:
+                return Qt.CheckState.Checked if row.is_ticked else Qt.CheckState.Unchecked
             case Qt.ItemDataRole.AccessibleDescriptionRole if place == 0:
                 return row.picture_text
             case Qt.ItemDataRole.ToolTipRole:
@@ -128,6 +135,20 @@ class _Model(QAbstractTableModel):
             case Qt.ItemDataRole.TextAlignmentRole:
                 return self._alignment(place)
         return None
+
+    def flags(self, index: _Index) -> Qt.ItemFlag:
+        has_box = index.column() == 0 and self.rows[index.row()].is_ticked is not None
+        boxes = Qt.ItemFlag.ItemIsUserCheckable if has_box else Qt.ItemFlag.NoItemFlags
+        return super().flags(index) | boxes
+
+    def setData(self, index: _Index, value: Any, role: int = Qt.ItemDataRole.EditRole) -> bool:
+        if role != Qt.ItemDataRole.CheckStateRole:
+            return False
+        is_ticked = Qt.CheckState(value) == Qt.CheckState.Checked
+        row = self.rows[index.row()] = replace(self.rows[index.row()], is_ticked=is_ticked)
+        self.dataChanged.emit(index, index)
+        self.tick(row.key, is_ticked)
+        return True
 
     def _alignment(self, place: int) -> Qt.AlignmentFlag:
         if not self.columns[place].is_number:
@@ -169,6 +190,8 @@ class Table(QTableView):
         How many rows can be selected. With *several*, one always is, as long as there are any.
     is_sorted : bool
         A click on a heading sorts by it, and F6 by the next column (Shift+F6: in reverse).
+    wraps : bool
+        Long texts have several lines instead of being cut.
 
     Attributes
     ----------
@@ -191,6 +214,7 @@ class Table(QTableView):
         chooses: Literal["none", "one", "several"] = "none",
         *,
         is_sorted: bool = False,
+        wraps: bool = False,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -211,7 +235,9 @@ class Table(QTableView):
         )
         self.setHorizontalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
         self.setTabKeyNavigation(False)
-        self.setWordWrap(False)
+        self.setWordWrap(wraps)
+        if wraps:
+            self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.setShowGrid(False)
         self.setAlternatingRowColors(True)
         self.verticalHeader().hide()
@@ -291,6 +317,10 @@ class Table(QTableView):
             for i in self._model.hidden
         }
 
+    def offer_ticks(self, tick: Callable[[Any, bool], object]) -> None:
+        """Call `tick` with the key of a row whose box was ticked or not, and which of the two."""
+        self._model.tick = tick
+
     def offer_delete(self, delete: Callable[[Any], object]) -> None:
         """Call `delete` with the key of the chosen row when Del or the menu asks for it."""
         self.delete_action = add_action(
@@ -345,9 +375,11 @@ class Table(QTableView):
             if columns[number].rank and sum(wanted_px[one] for one in shown) > room_px:
                 shown.remove(number)
         spare_px = max(0, room_px - sum(wanted_px[number] for number in shown))
+        rest = [number for number in shown if columns[number].is_rest] or shown
         for number in range(len(columns)):
             self.setColumnHidden(number, number not in shown)
-            self.setColumnWidth(number, wanted_px[number] + spare_px // len(shown))
+            more_px = spare_px // len(rest) if number in rest else 0
+            self.setColumnWidth(number, wanted_px[number] + more_px)
         hidden = [number for number in range(len(columns)) if number not in shown]
         if hidden != self._model.hidden:
             self._model.hidden = hidden
@@ -366,10 +398,13 @@ class Table(QTableView):
         text_px = font.horizontalAdvance(max(lines, key=len, default=""))
         if number == 0 and any(row.picture for row in self._model.rows):
             text_px += self.iconSize().width() + SPACING_PX
+        if number == 0 and any(row.is_ticked is not None for row in self._model.rows):
+            text_px += 3 * SPACING_PX
         title = self.horizontalHeader().fontMetrics()
         title_px = max(map(title.horizontalAdvance, column.title.split("\n")))
         arrow_px = 2 * SPACING_PX if self.isSortingEnabled() else 0
-        return min(max(text_px, title_px + arrow_px), _MOST_PX) + 2 * SPACING_PX
+        needed_px = 0 if column.is_rest else text_px
+        return min(max(needed_px, title_px + arrow_px), _MOST_PX) + 2 * SPACING_PX
 
     def _note_chosen(self) -> None:
         if self.delete_action is not None:

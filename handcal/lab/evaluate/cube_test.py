@@ -386,7 +386,7 @@ def _table(drawn: str, errors: Mapping[str, ErrorSummary]) -> Table:
     columns = [Column(title, "right" if title else "left") for title in titles]
     rows = [_cells(name, errors[key]) for key, name in _ERRORS.items()]
     pairs = next(iter(errors.values())).spread.count
-    return Table(columns, rows, f"{drawn}, {pairs} pairs of captures")
+    return Table(columns, rows, f"{drawn}, {pairs} pairs of captures", drawn.capitalize())
 
 
 def _cells(name: str, error: ErrorSummary) -> list[str]:

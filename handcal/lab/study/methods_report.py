@@ -139,7 +139,8 @@ def _reprojection_table(errors: ErrorTable) -> Table:
                 f"{spread.max:.2f}",
             ]
         )
-    return Table(columns, cells, "Reprojection error over all corners, eyes and distances.")
+    caption = "Reprojection error over all corners, eyes and distances."
+    return Table(columns, cells, caption, "Reprojection error")
 
 
 def _misalignment_table(errors: ErrorTable) -> Table:
@@ -157,7 +158,7 @@ def _misalignment_table(errors: ErrorTable) -> Table:
             for axis in range(3)
         ]
         cells.append([name, *(f"{mean:.2f}" if np.isfinite(mean) else "–" for mean in means)])
-    return Table(columns, cells, "Misalignment in space.")
+    return Table(columns, cells, "Misalignment in space.", "Misalignment in space")
 
 
 def _eye_distance(settings: MethodSettings, errors: ErrorTable) -> Section:

@@ -155,10 +155,13 @@ def _number(cell: float | str | None) -> float:
     return float(cell or 0.0)
 
 
-def _reach_deg(points: Sequence[_Point], method: str, mean_mm: _Mean) -> float:
-    """Return the rotation up to which a method's mean error is within the line; 0 if nowhere."""
+def _reach(points: Sequence[_Point], method: str, mean_mm: _Mean) -> str:
+    """Return, in words, up to which rotation a method's mean error is within the line."""
     found = sorted((point.value, mean_mm(point)) for point in points if point.method == method)
-    return max((value for value, _ in takewhile(lambda pair: pair[1] <= LINE_MM, found)), default=0)
+    within = [value for value, _ in takewhile(lambda pair: pair[1] <= LINE_MM, found)]
+    if not within:
+        return "at no rotation"
+    return f"up to {within[-1]:g}°" if within[-1] else "only at 0°"
 
 
 def _length_mm(point: _Point) -> float:
@@ -171,23 +174,22 @@ def _components_mm(point: _Point) -> float:
 
 def _lead(points: Sequence[_Point]) -> str:
     reaches = {
-        method: (_reach_deg(points, method, _length_mm), _reach_deg(points, method, _components_mm))
+        method: (_reach(points, method, _length_mm), _reach(points, method, _components_mm))
         for method in ("paper", "consistent")
     }
     (length, component), (own_length, own_component) = reaches.values()
     return (
-        f"On the paper's data, the paper's method keeps a mean |Δφ| within {LINE_MM:g} mm up to "
-        f"{length:g}°, and a mean error of its components up to {component:g}° (published: "
-        f"{_PUBLISHED_DEG:g}°); handcal's default up to {own_length:g}° and {own_component:g}°."
+        f"On the paper's data, the paper's method keeps a mean |Δφ| within {LINE_MM:g} mm "
+        f"{length}, and a mean error of its components {component} (published: up to "
+        f"{_PUBLISHED_DEG:g}°); handcal's default {own_length}, and {own_component}."
     )
 
 
 def _published(points: Sequence[_Point]) -> Table:
     """Return the paper's findings and those of this study."""
-    reach = f"within {LINE_MM:g} mm up to"
     rows = [
-        (f"{method}: {what} {reach}", published, f"{_reach_deg(points, method, mean):g}°")
-        for method, published in (("paper", f"{_PUBLISHED_DEG:g}°"), ("consistent", ""))
+        (f"{method}: {what} within {LINE_MM:g} mm", published, _reach(points, method, mean))
+        for method, published in (("paper", f"up to {_PUBLISHED_DEG:g}°"), ("consistent", ""))
         for what, mean in (("|Δφ|", _length_mm), ("mean of |Δφ1|, |Δφ2|, |Δφ3|", _components_mm))
     ]
     of = {(point.method, point.value): point.length.mean for point in points}

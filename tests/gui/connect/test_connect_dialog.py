@@ -11,11 +11,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QCheckBox,
+    QInputDialog,
     QLabel,
     QMessageBox,
     QPushButton,
-    QTableWidget,
-    QTableWidgetItem,
 )
 from pytestqt.qtbot import QtBot
 
@@ -25,8 +24,8 @@ from handcal.link.exchange import pair_by_code
 from handcal.link.invitation import read_invitation
 from handcal.link.pairing import Pairings
 from handcal.link.server import HeadsetServer, PairingAttempts
-from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.connect.connect_dialog import ConnectDialog, QrCode
+from handcal_gui.widgets.table import Table
 from tests.gui.helpers import child, text
 
 DEVICE = "00000000000000aa"
@@ -70,16 +69,6 @@ def connect(
         client.close()
 
 
-def button(dialog: ConnectDialog, name: str) -> QPushButton:
-    return child(dialog, QPushButton, name)
-
-
-def cell(table: QTableWidget, row: int, column: int) -> QTableWidgetItem:
-    found = table.item(row, column)
-    assert found is not None
-    return found
-
-
 def eye_of_square(client: HeadsetClient) -> str:
     target = client.state().target
     return "" if target is None else target.eye
@@ -88,26 +77,16 @@ def eye_of_square(client: HeadsetClient) -> str:
 def test_nothing_is_ticked_before_a_headset_has_connected(dialog: ConnectDialog) -> None:
     assert text(dialog, "headsetFound").startswith("No headset is connected yet")
     assert child(dialog, QLabel, "headsetHealth").accessibleName() == "Note"
-    assert not button(dialog, "square-left").isEnabled()
+    assert not child(dialog, QPushButton, "square-left").isEnabled()
     assert not child(dialog, QCheckBox, "squareSeen-left").isEnabled()
     assert len(text(dialog, "digits").replace(" ", "")) == 8
     assert child(dialog, QrCode).accessibleDescription().startswith("HANDCAL://")
 
 
-def test_the_empty_list_says_that_paired_headsets_appear_there(dialog: ConnectDialog) -> None:
-    heading = next(one for one in dialog.findChildren(QLabel) if one.text() == "Paired headsets")
-    empty = child(dialog, QLabel, "noDevices")
-    assert empty.isVisible()
-    assert "appear here once" in empty.text()
-    between_px = empty.mapTo(dialog, empty.rect().topLeft()).y() - heading.geometry().bottom()
-    assert 0 < between_px <= 2 * SPACING_PX
-    assert empty.alignment() & Qt.AlignmentFlag.AlignTop
-
-
 def test_enter_keeps_the_code_that_is_being_typed(dialog: ConnectDialog) -> None:
     code = text(dialog, "digits")
     focused = dialog.focusWidget()
-    assert focused is button(dialog, "close")
+    assert focused is child(dialog, QPushButton, "close")
     QTest.keyClick(focused, Qt.Key.Key_Return)
     assert not dialog.isVisible()
     assert text(dialog, "digits") == code
@@ -145,9 +124,8 @@ def test_a_headset_pairs_by_the_code_once(
     assert "Runtime 3" in found
     assert "App 1.2" in found
     assert "It sends no poses" in found
-    table = child(dialog, QTableWidget, "pairedDevices")
-    assert cell(table, 0, 1).text() == f"{DEVICE}, connected"
-    button(dialog, "invite").click()
+    assert f"{DEVICE}, connected" in child(dialog, Table, "pairedDevices").as_text()
+    child(dialog, QPushButton, "invite").click()
     assert child(dialog, QrCode).accessibleDescription().startswith("HANDCAL://")
 
 
@@ -159,7 +137,7 @@ def test_the_square_is_acknowledged_before_it_can_be_seen(
 ) -> None:
     client, _ = connect()
     dialog.refresh()
-    button(dialog, "square-right").click()
+    child(dialog, QPushButton, "square-right").click()
     seen = child(dialog, QCheckBox, "squareSeen-right")
     qtbot.waitUntil(seen.isEnabled, timeout=PATIENCE_MS)
     assert text(dialog, "squareState-right") == "acknowledged by the headset"
@@ -170,7 +148,7 @@ def test_the_square_is_acknowledged_before_it_can_be_seen(
     assert np.ptp(target.corners_V_m[:, 0]) == pytest.approx(0.08, abs=1e-6)
     assert set(client.state().projections) == {"right"}
     seen.setChecked(True)
-    button(dialog, "square-left").click()
+    child(dialog, QPushButton, "square-left").click()
     qtbot.waitUntil(lambda: eye_of_square(client) == "left", timeout=PATIENCE_MS)
     assert seen.isChecked()  # the wearer's word stays
     client.close()
@@ -186,18 +164,21 @@ def test_a_headset_is_renamed_and_revoked(
 ) -> None:
     client, _ = connect()
     dialog.refresh()
-    table = child(dialog, QTableWidget, "pairedDevices")
-    cell(table, 0, 0).setText("Ward 3")
-    assert [one.name for one in pairings.all] == ["Ward 3"]
-    cell(table, 0, 0).setText("x" * 41)
-    assert "at most 40 characters" in text(dialog, "connectProblem")
-    assert cell(table, 0, 0).text() == "Ward 3"
+    table = child(dialog, Table, "pairedDevices")
     table.selectRow(0)
+    for typed, said in (("Ward 3", ""), ("x" * 41, "at most 40 characters")):
+        monkeypatch.setattr(QInputDialog, "getText", lambda *_, name=typed, **__: (name, True))
+        child(dialog, QPushButton, "renameDevice").click()
+        assert [one.name for one in pairings.all] == ["Ward 3"]
+        assert said in text(dialog, "connectProblem")
+        assert "Ward 3" in table.as_text()
+        assert len(table.chosen) == 1
     monkeypatch.setattr(QMessageBox, "question", lambda *_: QMessageBox.StandardButton.No)
-    button(dialog, "revokeDevice").click()
+    child(dialog, QPushButton, "revokeDevice").click()
     assert pairings.all
     monkeypatch.setattr(QMessageBox, "question", lambda *_: QMessageBox.StandardButton.Yes)
-    button(dialog, "revokeDevice").click()
+    child(dialog, QPushButton, "revokeDevice").click()
     assert pairings.all == ()
-    assert table.isHidden()
+    assert "appear here once" in text(dialog, "pairedDevices-empty")
+    assert not child(dialog, QPushButton, "renameDevice").isEnabled()
     qtbot.waitUntil(lambda: not client.connected, timeout=PATIENCE_MS)

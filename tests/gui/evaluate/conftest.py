@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 from matplotlib.axes import Axes
-from PySide6.QtWidgets import QWidget
 
 from handcal.core.errors import HandcalError
 from handcal.core.progress import Progress
@@ -22,8 +21,6 @@ from handcal.report.document import Column, Figure, Report, Section, Table
 from handcal_gui.evaluate.evaluation_page import EvaluationSpec
 from handcal_gui.evaluate.work import StudyEvaluation
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.fields import whole_number
-from handcal_gui.widgets.path_field import PathField
 
 CASES = 10
 
@@ -80,11 +77,7 @@ class Numbers:
 
 
 def make_form() -> EntriesForm:
-    fields: dict[str, tuple[str, QWidget]] = {
-        "seed": ("Seed", whole_number("seed", 0, 9, "")),
-        "output": ("Results folder", PathField("Results folder", "folder")),
-    }
-    return EntriesForm(fields)
+    return EntriesForm(NoiseStudySettings, ("seed", "output"))
 
 
 @pytest.fixture

@@ -22,9 +22,8 @@ from pytestqt.qtbot import QtBot
 
 from handcal.lab.settings import MethodComparisonSettings, NoiseStudySettings
 from handcal.lab.study.run import run_study
-from handcal_gui.evaluate.entries import EvaluationEntries
+from handcal_gui.evaluate.entries import EvaluationEntries, make_specs
 from handcal_gui.evaluate.evaluation_page import EvaluationPage
-from handcal_gui.evaluate.specs import make_specs
 from handcal_gui.evaluate.window import EvaluationWindow
 from handcal_gui.widgets.fields import MainButton
 from handcal_gui.widgets.table import Table

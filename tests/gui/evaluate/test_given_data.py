@@ -15,8 +15,7 @@ from handcal.core.progress import Progress
 from handcal.lab.evaluate.user_test import UserTestRun
 from handcal.report.document import Report
 from handcal.report.html import write_report
-from handcal_gui.evaluate.entries import EvaluationEntries, UserEntries
-from handcal_gui.evaluate.specs import make_specs
+from handcal_gui.evaluate.entries import EvaluationEntries, UserEntries, make_specs
 from handcal_gui.evaluate.window import EvaluationWindow
 from handcal_gui.evaluate.work import FileEvaluation
 from tests.gui.helpers import child

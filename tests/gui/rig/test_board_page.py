@@ -27,6 +27,7 @@ from handcal_gui.rig.board_page import BoardPage
 from handcal_gui.rig.project import RigProject
 from handcal_gui.rig.project_folder import ProjectFolder
 from handcal_gui.widgets.image_view import ImageView
+from tests.gui.helpers import child, text
 
 ORIGIN = Origin("as told", "now", 3, 0.1, "good", "as told", ("a",), np.eye(1))
 
@@ -44,12 +45,6 @@ def page(qtbot: QtBot, project: RigProject) -> Iterator[BoardPage]:
     yield page
     page.stop()
     project.save()
-
-
-def found(page: BoardPage) -> str:
-    label = page.findChild(QLabel, "boardFound")
-    assert isinstance(label, QLabel)
-    return label.text()
 
 
 def press(page: BoardPage, name: str) -> None:
@@ -71,27 +66,25 @@ def test_the_board_shown_is_the_one_entered(
     square.setValue(24.9)
     expected = Board("checkerboard", (12, 7), 0.0249)
     assert project.inputs.board == expected
-    assert "11 × 6" in found(page)
-    assert "No image shows this board yet" in found(page)
+    assert "11 × 6" in text(page, "boardFound")
+    assert "No image shows this board yet" in text(page, "boardFound")
     project.note_found(Board())
     assert not project.inputs.board_found, "this is another board"
     project.note_found(expected)
     page.enter()
-    assert "found in an image" in found(page)
-    preview = page.findChild(ImageView)
-    assert isinstance(preview, ImageView)
+    assert "found in an image" in text(page, "boardFound")
+    preview = child(page, ImageView)
     qtbot.waitUntil(lambda: preview.has_image)
 
 
 def test_an_impossible_board_is_reported_and_not_taken(
     page: BoardPage, project: RigProject
 ) -> None:
-    marker = page.findChild(QDoubleSpinBox, "marker")
-    assert isinstance(marker, QDoubleSpinBox)
+    marker = child(page, QDoubleSpinBox, "marker")
     marker.setValue(25.0)
-    assert "0.3 to 0.95" in found(page)
+    assert "0.3 to 0.95" in text(page, "boardFound")
     page.enter()
-    assert "0.3 to 0.95" in found(page), "the step is shown again"
+    assert "0.3 to 0.95" in text(page, "boardFound"), "the step is shown again"
     assert project.inputs.board == Board()
     assert not page.main.isEnabled()  # or the board before would be saved as this one
     marker.setValue(10.0)
@@ -104,13 +97,13 @@ def test_the_board_is_saved(
     choose(tmp_path / "board.pdf")
     press(page, "savePdf")
     assert (tmp_path / "board.pdf").read_bytes().startswith(b"%PDF")
-    assert "100 %" in found(page)
+    assert "100 %" in text(page, "boardFound")
     choose(tmp_path / "board.png")
     press(page, "savePicture")
     assert (tmp_path / "board.png").read_bytes().startswith(b"\x89PNG")
     choose(tmp_path / "missing" / "board.pdf")
     press(page, "savePdf")
-    assert "Not saved" in found(page)
+    assert "Not saved" in text(page, "boardFound")
 
 
 def test_dialogs_begin_in_the_folder_used_last(
@@ -176,7 +169,7 @@ def test_another_rig_is_begun_from(
     assert project.rig.name == "theirs"
     choose(tmp_path / "none.yaml")
     press(page, "begin")
-    assert "none.yaml" in found(page)
+    assert "none.yaml" in text(page, "boardFound")
 
 
 def test_only_what_is_not_saved_is_asked_about_and_no_is_the_default(

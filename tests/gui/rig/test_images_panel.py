@@ -7,15 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import (
     QComboBox,
     QLabel,
     QPushButton,
-    QTreeWidget,
-    QTreeWidgetItem,
-    QWidget,
 )
 from pytestqt.qtbot import QtBot
 
@@ -30,9 +26,10 @@ from handcal_gui.rig.maps import CoverageMap, UncertaintyMap
 from handcal_gui.rig.project import RigProject
 from handcal_gui.rig.project_folder import ProjectFolder
 from handcal_gui.rig.solve import SolvedPart
-from handcal_gui.widgets.drawing import Drawing
 from handcal_gui.widgets.image_view import ImageView
-from tests.gui.helpers import child
+from handcal_gui.widgets.table import Table
+from tests.gui.helpers import child, text
+from tests.gui.rig.wizard_steps import cell, tick
 
 PAGES = "setup-stereo", "setup-viewpoint", "setup-display", "setup-board"
 
@@ -67,22 +64,8 @@ def look(panel: ImagesPanel, photographs: Any, dropped: tuple[str, ...] = ()) ->
     panel.look(folders, photographs.work.board, dropped)
 
 
-def item(panel: ImagesPanel, row: int) -> QTreeWidgetItem:
-    shots = panel.findChild(QTreeWidget, "shots")
-    assert isinstance(shots, QTreeWidget)
-    found = shots.topLevelItem(row)
-    assert found is not None
-    return found
-
-
 def captions(panel: ImagesPanel) -> list[QLabel]:
     return panel.findChildren(QLabel, "shotCaption")
-
-
-def text(panel: QWidget, name: str) -> str:
-    label = panel.findChild(QLabel, name)
-    assert isinstance(label, QLabel)
-    return label.text()
 
 
 def test_an_image_is_shown_although_the_other_of_its_pair_cannot_be_read(
@@ -94,15 +77,15 @@ def test_an_image_is_shown_although_the_other_of_its_pair_cannot_be_read(
     qtbot.waitUntil(lambda: headset.has_image and "depth-001.png" in depth.message)
     assert not depth.has_image
     assert headset.message == ""
-    assert "depth-001.png" in item(panel, 0).toolTip(4), "the list may cut it"
+    assert "depth-001.png" in cell(panel, 0, 4)
 
 
 def test_what_was_found_is_listed(qtbot: QtBot, full: ImagesPanel) -> None:
     assert text(full, "count") == "8 of 9 used"
-    assert item(full, 0).text(0) == "depth-001.png"
-    assert all(int(count) > 8 for count in item(full, 0).text(1).split(" · "))
-    assert item(full, 8).text(0) == "depth-099.png"
-    assert item(full, 8).text(4) == f"{full.shots[8].problem[0].upper()}{full.shots[8].problem[1:]}"
+    assert cell(full, 0, 0) == "depth-001.png"
+    assert all(int(count) > 8 for count in cell(full, 0, 1).split(" · "))
+    assert cell(full, 8, 0) == "depth-099.png"
+    assert cell(full, 8, 4) == f"⚠ {full.shots[8].problem[0].upper()}{full.shots[8].problem[1:]}"
     images = full.findChildren(ImageView)
     qtbot.waitUntil(lambda: all(image.has_image for image in images))
     first, second = captions(full)
@@ -115,12 +98,12 @@ def test_a_dropped_pair_no_longer_counts(qtbot: QtBot, full: ImagesPanel) -> Non
     before = [shown.caption for shown in maps]
     with qtbot.waitSignal(full.dropped_changed):
         for row in range(1, 8):
-            item(full, row).setCheckState(0, Qt.CheckState.Unchecked)
+            tick(child(full, Table, "shots"), row, False)
     assert full.dropped_of(()) == tuple(f"depth-{n:03}.png" for n in range(2, 9))
     assert text(full, "count") == "1 of 9 used"
     assert [shown.caption for shown in maps] != before
     for row in range(1, 8):
-        item(full, row).setCheckState(0, Qt.CheckState.Checked)
+        tick(child(full, Table, "shots"), row, True)
     assert [shown.caption for shown in maps] == before
 
 
@@ -129,10 +112,10 @@ def test_results_stand_beside_the_images(full: ImagesPanel) -> None:
     verdict = CalibrationVerdict("good", "as told")
     residuals = {"depth-001.png": 0.25, "depth-002.png": 0.7}
     full.show_solved(SolvedPart(verdict, (), residuals, {"depth-001.png": 0.5}, worst))
-    assert [item(full, 0).text(column) for column in (2, 3)] == ["0.25", "29°"]
-    assert item(full, 1).text(4) == "Worst: it is blurred"
-    assert item(full, 2).text(2) == "–"
-    assert item(full, 8).text(4), "why there is no board"
+    assert [cell(full, 0, column) for column in (2, 3)] == ["0.25", "29°"]
+    assert cell(full, 1, 4) == "Worst: it is blurred"
+    assert cell(full, 2, 2) == "–"
+    assert cell(full, 8, 4), "why there is no board"
 
 
 @pytest.mark.parametrize("entered", [Board(squares=(10, 7)), replace(BOARD, legacy=True)])
@@ -151,7 +134,7 @@ def test_another_board_in_the_images_is_named_once_and_taken_by_a_button(
     offer = child(panel.search, QPushButton, "imagesFix")
     qtbot.waitUntil(lambda: not panel.bar.is_busy, timeout=20_000)
     assert panel.used == 0
-    assert {item(panel, row).text(4) for row in range(8)} == {"Another board"}, "said once, below"
+    assert {cell(panel, row, 4) for row in range(8)} == {"⚠ Another board"}, "said once, below"
     assert ("10 × 7" in text(panel.search, "imagesFound")) == (entered.squares == (10, 7))
     offer.click()
     qtbot.waitUntil(lambda: not panel.bar.is_busy, timeout=20_000)
@@ -204,7 +187,7 @@ def test_the_reason_for_no_images_is_reported(
 def test_what_was_left_out_of_other_images_is_forgotten(
     qtbot: QtBot, full: ImagesPanel, photographs: Any
 ) -> None:
-    item(full, 0).setCheckState(0, Qt.CheckState.Unchecked)
+    tick(child(full, Table, "shots"), 0, False)
     before = full.dropped_of(())
     assert before
     folders = photographs.work.stereo.headset_images, photographs.work.stereo.depth_images
@@ -214,13 +197,6 @@ def test_what_was_left_out_of_other_images_is_forgotten(
     assert full.dropped_of(before) == ()
 
 
-@pytest.mark.parametrize("page", sorted(PAGES))
-def test_every_step_has_a_drawing(qtbot: QtBot, page: str) -> None:
-    drawing = Drawing(f"docs/pictures/{page}.svg")
-    qtbot.addWidget(drawing)
-    assert drawing.is_readable
-
-
 def test_the_uncertainty_of_a_solved_camera_is_shown(qtbot: QtBot, panel: ImagesPanel) -> None:
     sigma_px = np.full((9, 12), 0.1)
     sigma_px[0, 0], sigma_px[0, 1] = 2.0, np.nan
@@ -228,8 +204,7 @@ def test_the_uncertainty_of_a_solved_camera_is_shown(qtbot: QtBot, panel: Images
     panel.show_solved(
         SolvedPart(CalibrationVerdict("good", ""), (), {}, uncertainties=(found, None))
     )
-    shown_map = panel.findChild(QComboBox, "map")
-    assert isinstance(shown_map, QComboBox)
+    shown_map = child(panel, QComboBox, "map")
     shown_map.setCurrentIndex(1)
     maps = panel.findChildren(UncertaintyMap)
     assert [one.caption for one in maps] == ["Depth camera: ± 0.10, 0.90 px", "Headset camera: –"]

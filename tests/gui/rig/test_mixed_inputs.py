@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QMessageBox, QPushButton, QTabWidget, QTreeWidget
+from PySide6.QtWidgets import QLabel, QMessageBox, QPushButton, QTabWidget
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.rig.project_folder import ProjectFolder
-from handcal_gui.rig.step_page import StepPage
 from handcal_gui.rig.wizard import RigWizard
+from handcal_gui.widgets.table import Table
 from tests.gui.rig.wizard_steps import (
     LEFT,
     RESULT,
@@ -25,15 +24,11 @@ from tests.gui.rig.wizard_steps import (
     child,
     findings,
     marks,
+    page_of,
     solve,
+    tick,
     wait,
 )
-
-
-def page_of(wizard: RigWizard) -> StepPage:
-    page = wizard.page
-    assert isinstance(page, StepPage)
-    return page
 
 
 def test_another_board_makes_every_solved_step_outdated(
@@ -133,11 +128,11 @@ def test_an_image_unticked_makes_the_result_one_of_other_images(
 ) -> None:
     wizard.show_step(STEREO)
     wait(qtbot, wizard)
-    shots = child(wizard, QTreeWidget, "shots")
+    shots = child(wizard, Table, "shots")
     child(wizard, QPushButton, "solve").click()
     if not is_solving:
         wait(qtbot, wizard)
-    shots.topLevelItem(1).setCheckState(0, Qt.CheckState.Unchecked)
+    tick(shots, 1, False)
     wait(qtbot, wizard)
     text = "olved with other inputs (excluded images): solve it again"
     assert child(wizard, QLabel, "verdictFound").text() == f"S{text}."

@@ -32,9 +32,7 @@ def program(qtbot: QtBot, tmp_path: Path) -> Iterator[Program]:
 
 
 def test_the_start_page_leads_to_a_rig_that_it_uses(program: Program, tmp_path: Path) -> None:
-    button = program.start.findChild(QPushButton, "calibrateRig")
-    assert isinstance(button, QPushButton)
-    button.click()
+    program.start.new.form.calibrate_rig.click()
     (wizard,) = program.window.findChildren(RigWizard)
     assert wizard.isVisible()
     assert (tmp_path / "config" / "rig").is_dir()
@@ -52,8 +50,7 @@ def test_the_start_page_leads_to_a_rig_that_it_uses(program: Program, tmp_path: 
 def test_the_rig_is_named_as_soon_as_the_wizard_is_closed(
     qtbot: QtBot, program: Program, tmp_path: Path
 ) -> None:
-    found = program.window.findChild(QLabel, "rigFound")
-    assert isinstance(found, QLabel)
+    [found] = program.window.findChildren(QLabel, "rigFound")
     qtbot.waitUntil(lambda: "Example" in found.text())
     wizard = program.windows.calibrate_rig()
     assert wizard is not None

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from handcal.camera.take_board import keep_images
-from handcal.core.errors import CancelledError, FileError
+from handcal.core.errors import CancelledError
 from handcal.core.progress import Progress
 from handcal.rig.boards.views import ViewsError
 from handcal_gui.rig.shots import excluding, look
@@ -45,8 +45,3 @@ def test_images_that_do_not_belong_together_are_told(photographs: Any, tmp_path:
     (tmp_path / "b" / "b-001.png").rename(tmp_path / "b" / "b-7.png")
     with pytest.raises(ViewsError, match="belong together"):
         look([tmp_path / "a", tmp_path / "b"], photographs.work.board)
-
-
-def test_an_empty_folder_is_reported(photographs: Any, tmp_path: Path) -> None:
-    with pytest.raises(FileError, match="no PNG"):
-        look([tmp_path], photographs.work.board)

@@ -233,8 +233,3 @@ def command(*words: object) -> None:
     """Run ``handcal rig WORDS``."""
     arguments = parse(["rig", *map(str, words)])
     arguments.command(arguments)
-
-
-def test_a_grid_without_room_is_reported() -> None:
-    with pytest.raises(HandcalError, match="no room"):
-        grid_on(1268, 720, square_px=700)

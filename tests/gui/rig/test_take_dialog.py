@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
-    QApplication,
     QCheckBox,
     QComboBox,
     QLabel,
@@ -32,9 +31,8 @@ from handcal_gui.rig.step_page import StepPage
 from handcal_gui.rig.take_dialog import TakeDialog
 from handcal_gui.rig.wizard import RigWizard
 from handcal_gui.widgets.fields import MainButton
-from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.path_field import PathField
-from tests.gui.helpers import child
+from tests.gui.helpers import child, text
 from tests.gui.rig.wizard_steps import STEREO, wait
 
 REALSENSE_SETTINGS = RealSenseSettings(serial="42")
@@ -72,36 +70,24 @@ def dialog(
     dialog.reject()
 
 
-def button(dialog: TakeDialog, name: str) -> QPushButton:
-    found = dialog.findChild(QPushButton, name)
-    assert isinstance(found, QPushButton)
-    return found
-
-
-def said(dialog: TakeDialog) -> str:
-    found = dialog.findChild(QLabel, "takenFound")
-    assert isinstance(found, QLabel)
-    return found.text()
-
-
 def start(qtbot: QtBot, dialog: TakeDialog) -> None:
-    button(dialog, "startCameras").click()
-    qtbot.waitUntil(button(dialog, "takeImage").isEnabled)
+    child(dialog, QPushButton, "startCameras").click()
+    qtbot.waitUntil(child(dialog, QPushButton, "takeImage").isEnabled)
 
 
 def test_both_cameras_images_are_taken(
     qtbot: QtBot, dialog: TakeDialog, cameras: dict[str, Any], tmp_path: Path
 ) -> None:
-    assert not button(dialog, "takeImage").isEnabled()
+    assert not child(dialog, QPushButton, "takeImage").isEnabled()
     start(qtbot, dialog)
     QTest.keyClick(dialog, Qt.Key.Key_Space)
-    qtbot.waitUntil(lambda: "corners" in said(dialog))
-    assert said(dialog).startswith("depth-001.png: ")
+    qtbot.waitUntil(lambda: "corners" in text(dialog, "takenFound"))
+    assert text(dialog, "takenFound").startswith("depth-001.png: ")
     cameras["1"].image = np.full((360, 640, 3), 90, np.uint8)
     qtbot.waitUntil(lambda: dialog.shown_images is not None and dialog.shown_images[1].max() == 90)
-    button(dialog, "takeImage").click()
-    qtbot.waitUntil(lambda: said(dialog).startswith("headset-002.png: "))
-    assert "Take another" in said(dialog)
+    child(dialog, QPushButton, "takeImage").click()
+    qtbot.waitUntil(lambda: text(dialog, "takenFound").startswith("headset-002.png: "))
+    assert "Take another" in text(dialog, "takenFound")
     depth = read_color(tmp_path / "depth" / "depth-002.png")
     np.testing.assert_array_equal(depth, cameras["0"].image)
     dialog.accept()
@@ -120,8 +106,8 @@ def test_what_is_taken_is_counted_and_what_it_covers_is_shown_at_once(
     kinds = child(dialog, QLabel, "takenKinds")
     assert kinds.text() == "0 near, 0 far, 0 tilted"
     start(qtbot, dialog)
-    button(dialog, "takeImage").click()
-    qtbot.waitUntil(lambda: "corners" in said(dialog))
+    child(dialog, QPushButton, "takeImage").click()
+    qtbot.waitUntil(lambda: "corners" in text(dialog, "takenFound"))
     assert count() == "1 of 20 usable pairs of images"
     assert re.fullmatch(r"[01] near, [01] far, [01] tilted", kinds.text())
     assert kinds.text() != "0 near, 0 far, 0 tilted", "the board is tilted in it"
@@ -129,19 +115,10 @@ def test_what_is_taken_is_counted_and_what_it_covers_is_shown_at_once(
     assert all(caption.endswith(" %") for caption in covered)
     cameras["1"].image = np.full((360, 640, 3), 90, np.uint8)
     qtbot.waitUntil(lambda: dialog.shown_images is not None and dialog.shown_images[1].max() == 90)
-    button(dialog, "takeImage").click()
-    qtbot.waitUntil(lambda: "Take another" in said(dialog))
+    child(dialog, QPushButton, "takeImage").click()
+    qtbot.waitUntil(lambda: "Take another" in text(dialog, "takenFound"))
     assert count() == "1 of 20 usable pairs of images", "the headset camera's shows no board"
     assert [one.caption for one in maps] == covered
-    dialog.resize(952, 492)  # as on a screen of 960x540, with the window's frame
-    QApplication.processEvents()
-    assert (dialog.width(), dialog.height()) == (952, 492)
-    assert all(one.height() >= 220 for one in dialog.findChildren(ImageView)), "to judge sharpness"
-    foot_px = button(dialog, "takeImage").mapTo(dialog, QPoint()).y()
-    for one in maps:
-        assert one.isVisible()
-        assert dialog.rect().contains(one.geometry())
-        assert one.geometry().bottom() < foot_px
 
 
 def test_earlier_images_count(qtbot: QtBot, wizard: RigWizard, photographs: Any) -> None:
@@ -166,11 +143,13 @@ def test_what_has_been_taken_is_not_taken_again(
     qtbot: QtBot, dialog: TakeDialog, tmp_path: Path
 ) -> None:
     start(qtbot, dialog)
-    button(dialog, "takeImage").click()
-    qtbot.waitUntil(lambda: "corners" in said(dialog))
-    qtbot.waitUntil(button(dialog, "takeImage").isEnabled)
-    button(dialog, "takeImage").click()
-    qtbot.waitUntil(lambda: said(dialog) == "This has been taken already. Take another.")
+    child(dialog, QPushButton, "takeImage").click()
+    qtbot.waitUntil(lambda: "corners" in text(dialog, "takenFound"))
+    qtbot.waitUntil(child(dialog, QPushButton, "takeImage").isEnabled)
+    child(dialog, QPushButton, "takeImage").click()
+    qtbot.waitUntil(
+        lambda: text(dialog, "takenFound") == "This has been taken already. Take another."
+    )
     assert len(list(tmp_path.rglob("*.png"))) == 2
 
 
@@ -197,21 +176,20 @@ def test_a_failing_camera_is_reported_and_can_be_shown_again(
 ) -> None:
     start(qtbot, dialog)
     cameras["1"].failure = CameraError("it was unplugged")
-    told = "It was unplugged. Press Show to open the cameras again."
-    qtbot.waitUntil(lambda: said(dialog) == told)
-    assert not button(dialog, "takeImage").isEnabled()
+    told = "It was unplugged. Press Show to open the camera again."
+    qtbot.waitUntil(lambda: text(dialog, "takenFound") == told)
+    assert not child(dialog, QPushButton, "takeImage").isEnabled()
     start(qtbot, dialog)
-    assert said(dialog) == "", "it is over"
+    assert text(dialog, "takenFound") == "", "it is over"
 
 
 def test_images_are_taken_by_themselves_until_they_are_enough(
     qtbot: QtBot, dialog: TakeDialog, tmp_path: Path
 ) -> None:
-    by_itself = dialog.findChild(QCheckBox, "byItself")
-    assert isinstance(by_itself, QCheckBox)
+    by_itself = child(dialog, QCheckBox, "byItself")
     start(qtbot, dialog)
     by_itself.click()
-    qtbot.waitUntil(lambda: said(dialog) == "2 taken: enough images.")
+    qtbot.waitUntil(lambda: text(dialog, "takenFound") == "2 taken: enough images.")
     assert child(dialog, QLabel, "takenCount").text() == "2 of 20 usable pairs of images"
     assert not by_itself.isChecked()
     for folder in ("depth", "headset"):
@@ -229,7 +207,7 @@ def test_a_recording_that_begins_again_is_not_taken_again_by_itself(
         dialog.findChildren(PathField)[number].set_path(path)
     start(qtbot, dialog)
     child(dialog, QCheckBox, "byItself").click()
-    qtbot.waitUntil(lambda: said(dialog) == "1 taken; this has been taken already.")
+    qtbot.waitUntil(lambda: text(dialog, "takenFound") == "1 taken; this has been taken already.")
     assert len(list(tmp_path.rglob("*.png"))) == 2
 
 
@@ -238,18 +216,17 @@ def test_what_is_not_taken_by_itself_is_explained(
 ) -> None:
     cameras["1"].image = np.full((360, 640, 3), 90, np.uint8)
     start(qtbot, dialog)
-    by_itself = dialog.findChild(QCheckBox, "byItself")
-    assert isinstance(by_itself, QCheckBox)
+    by_itself = child(dialog, QCheckBox, "byItself")
     by_itself.click()
     told = "0 taken; the board is not seen by the headset camera: bring it into view, "
-    qtbot.waitUntil(lambda: said(dialog) == f"{told}and see to focus and light.")
+    qtbot.waitUntil(lambda: text(dialog, "takenFound") == f"{told}and see to focus and light.")
     assert not (tmp_path / "depth").exists()
 
 
 def test_what_is_missing_is_said_and_nothing_can_be_shown_without_it(
     qtbot: QtBot, dialog: TakeDialog, cameras: dict[str, Any], tmp_path: Path
 ) -> None:
-    task, show = child(dialog, QLabel, "takeShow"), button(dialog, "startCameras")
+    task, show = child(dialog, QLabel, "takeTask"), child(dialog, QPushButton, "startCameras")
     source = dialog.findChildren(QComboBox, "source")[1]
     source.setCurrentIndex(source.findText("Recording or video"))
     assert task.text() == "Choose the recording or video of the headset camera."
@@ -258,7 +235,7 @@ def test_what_is_missing_is_said_and_nothing_can_be_shown_without_it(
     assert task.text() == "Both are the same camera: choose another for one of them."
     assert not show.isEnabled()
     source.setCurrentIndex(source.findText("Camera 1"))
-    assert task.text() == "Choose the cameras and press Show."
+    assert task.text() == "Choose a camera or a recording, and press Show."
     assert show.isEnabled()
 
 

@@ -8,13 +8,13 @@ from PySide6.QtWidgets import QToolButton
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.widgets.banner import Banner
+from tests.gui.helpers import child
 
 
 def test_a_message_stays_until_it_is_closed_and_hides_the_condition(qtbot: QtBot) -> None:
     banner = Banner()
     qtbot.addWidget(banner)
-    close = banner.findChild(QToolButton, "bannerClose")
-    assert isinstance(close, QToolButton)
+    close = child(banner, QToolButton, "bannerClose")
     assert banner.isHidden()
     banner.show_condition("no camera")
     assert (banner.text, banner.isHidden(), close.isHidden()) == ("no camera", False, True)
@@ -27,21 +27,10 @@ def test_a_message_stays_until_it_is_closed_and_hides_the_condition(qtbot: QtBot
     assert (banner.text, banner.isHidden()) == ("", True)
 
 
-def test_the_newest_message_wins(qtbot: QtBot) -> None:
-    banner = Banner()
-    qtbot.addWidget(banner)
-    banner.show_message("first")
-    banner.show_message("second")
-    assert banner.text == "second"
-    banner.clear()
-    assert banner.isHidden()
-
-
 def test_a_notice_ends_by_itself_and_closes_no_message(qtbot: QtBot) -> None:
     banner = Banner()
     qtbot.addWidget(banner)
-    timer = banner.findChild(QTimer)
-    assert isinstance(timer, QTimer)
+    timer = child(banner, QTimer)
     banner.show_notice("opens soon")
     assert (banner.text, timer.isActive()) == ("opens soon", True)
     timer.timeout.emit()

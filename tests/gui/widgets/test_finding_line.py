@@ -10,12 +10,12 @@ from pytestqt.qtbot import QtBot
 
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.widgets.finding_line import FindingLine
+from tests.gui.helpers import child
 
 
 def shape(line: FindingLine) -> bytes:
     """Return the icon without its colour."""
-    label = line.findChild(QLabel, "xHealth")
-    assert isinstance(label, QLabel)
+    label = child(line, QLabel, "xHealth")
     image = label.pixmap().toImage().convertToFormat(QImage.Format.Format_Alpha8)
     return np.frombuffer(image.constBits(), np.uint8).tobytes()
 
@@ -27,8 +27,7 @@ def test_each_health_has_a_shape_and_a_word(qtbot: QtBot) -> None:
     for health in Health:
         line.show_finding(Finding("X", health, "found"))
         shapes.add(shape(line))
-        label = line.findChild(QLabel, "xHealth")
-        assert isinstance(label, QLabel)
+        label = child(line, QLabel, "xHealth")
         words.add(label.accessibleName())
     assert len(shapes) == len(words) == 3
 
@@ -47,8 +46,7 @@ def test_what_was_found_and_the_advice_are_sentences(
     line = FindingLine("x")
     qtbot.addWidget(line)
     line.show_finding(Finding("X", Health.BROKEN, found, advice))
-    text = line.findChild(QLabel, "xFound")
-    assert isinstance(text, QLabel)
+    text = child(line, QLabel, "xFound")
     assert text.text() == shown
 
 
@@ -56,8 +54,7 @@ def test_a_click_mends(qtbot: QtBot) -> None:
     line = FindingLine("x")
     qtbot.addWidget(line)
     mended: list[str] = []
-    button = line.findChild(QPushButton, "xFix")
-    assert isinstance(button, QPushButton)
+    button = child(line, QPushButton, "xFix")
     line.show_finding(Finding("X", Health.BROKEN, "a"), "Mend", lambda: mended.append("a"))
     line.show_finding(Finding("X", Health.BROKEN, "b"), "Mend", lambda: mended.append("b"))
     assert not button.isHidden()

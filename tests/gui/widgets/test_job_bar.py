@@ -7,9 +7,9 @@ import pytest
 from PySide6.QtWidgets import QLabel, QProgressBar, QPushButton
 from pytestqt.qtbot import QtBot
 
-from handcal.core.errors import FileError
 from handcal.core.progress import Progress
 from handcal_gui.widgets.job_bar import JobBar
+from tests.gui.helpers import child
 
 
 @pytest.fixture
@@ -53,22 +53,11 @@ def test_a_job_is_shown_and_its_result_taken(qtbot: QtBot, bar: JobBar) -> None:
 def test_a_job_is_cancelled(qtbot: QtBot, bar: JobBar) -> None:
     taken = list[object]()
     bar.run("Beginning", until_cancelled, taken.append)
-    cancel = bar.findChild(QPushButton, "cancel")
-    assert isinstance(cancel, QPushButton)
+    cancel = child(bar, QPushButton, "cancel")
     cancel.click()
     assert not cancel.isEnabled()
     qtbot.waitUntil(lambda: not bar.is_busy)
     assert not taken
-
-
-def test_a_failure_is_reported(qtbot: QtBot, bar: JobBar) -> None:
-    def work(_progress: Progress) -> object:
-        raise FileError("no such folder")
-
-    with qtbot.waitSignal(bar.failed) as failed:
-        bar.run("Beginning", work, lambda _: None)
-    assert failed.args == ["no such folder"]
-    assert not bar.is_busy
 
 
 def test_the_newest_job_counts(qtbot: QtBot, bar: JobBar) -> None:

@@ -67,8 +67,7 @@ def test_a_file_or_a_folder_is_chosen_in_a_dialog(
     folder = PathField("Folder", "folder")
     for field in (file, folder):
         qtbot.addWidget(field)
-    button = file.findChild(QPushButton, "fileChoice")
-    assert isinstance(button, QPushButton)
+    button = child(file, QPushButton, "fileChoice")
     with qtbot.waitSignal(file.changed):
         button.click()
     assert file.path == "/a/rig.yaml"
@@ -79,23 +78,10 @@ def test_a_file_or_a_folder_is_chosen_in_a_dialog(
     assert folder.path == "/b"
 
 
-def test_either_is_chosen_by_its_own_button(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: ("/a.db3", ""))
-    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: "/b")
-    field = PathField("Recording", "either")
-    qtbot.addWidget(field)
-    buttons = field.findChildren(QPushButton)
-    assert [button.text() for button in buttons] == ["File…", "Folder…"]
-    for button, path in zip(buttons, ("/a.db3", "/b"), strict=True):
-        button.click()
-        assert field.path == path
-
-
 def test_blanks_around_a_typed_path_do_not_count(qtbot: QtBot) -> None:
     field = PathField("Rig file", "file")
     qtbot.addWidget(field)
-    line = field.findChild(QLineEdit)
-    assert isinstance(line, QLineEdit)
+    line = child(field, QLineEdit)
     with qtbot.waitSignal(field.changed):
         line.setText("  /a b ")
     assert field.path == "/a b"

@@ -63,10 +63,5 @@ def test_a_gap_is_not_bridged(plot: Plot) -> None:
     assert 0.3 * whole < red_pixels() < 0.7 * whole
 
 
-def test_neither_wheel_nor_menu_changes_a_plot(plot: Plot) -> None:
-    assert plot.item.vb.state["mouseEnabled"] == [False, False]
-    assert not plot.item.vb.menuEnabled()
-
-
 def test_negative_numbers_on_an_axis_have_a_minus(plot: Plot) -> None:
     assert plot.item.getAxis("left").tickStrings([-1.5, 0.0], 1.0, 0.5) == ["−1.5", "0"]

@@ -111,6 +111,28 @@ def test_columns_that_do_not_fit_are_left_out_by_rank_and_are_in_the_tooltip(
     assert "Size mm: 1.25" in table.model().index(0, 0).data(Qt.ItemDataRole.ToolTipRole)
 
 
+def test_a_row_is_ticked_by_the_space_bar(qtbot: QtBot, table: Table) -> None:
+    ticked: list[tuple[int, bool]] = []
+    table.offer_ticks(lambda key, is_ticked: ticked.append((key, is_ticked)))
+    table.show_rows(THINGS, [Row("", ("1", "thing"), key=7, is_ticked=True), *rows_of(8)])
+    table.choose([7])
+    for _ in range(2):
+        QTest.keyClick(table, Qt.Key.Key_Space)
+    assert ticked == [(7, False), (7, True)]
+    table.choose([8])
+    QTest.keyClick(table, Qt.Key.Key_Space)
+    assert len(ticked) == 2, "it has no box"
+
+
+def test_one_column_takes_what_the_others_leave(table: Table) -> None:
+    columns = (Column("Name"), Column("Note", is_number=False, is_rest=True))
+    for note in ("short", 99 * "long "):
+        table.show_rows(columns, [Row("", ("thing", note), key=1)])
+        table.resize(400, 200)
+        assert not table.horizontalScrollBar().isVisible()
+        assert table.columnWidth(0) < table.columnWidth(1)
+
+
 def test_no_number_is_cut_and_two_lines_have_their_room(table: Table) -> None:
     table.show_rows(THINGS, [*rows_of(1), Row("", ("12345.67", "left\nright"), key=2)])
     assert table.columnWidth(0) >= table.sizeHintForColumn(0)
