@@ -36,7 +36,6 @@ from handcal_gui.calibrate.parts.legend import RESIDUALS, LegendEntry
 from handcal_gui.calibrate.parts.missing import missing_text
 from handcal_gui.calibrate.parts.paint_turns import update_in_turn
 from handcal_gui.calibrate.parts.residual_scale import (
-    OUTLIER,
     ResidualScale,
     draw_crosses,
     residual_colors,
@@ -63,7 +62,6 @@ _LABELS_EMS = (7.0, 4.5)
 _UNLABELLED_EMS = (1.0, 1.0)
 _LEAST_LABELLED_EMS = 11.0
 """Height below which the box has no labels: the hand would be too small beside them."""
-_NO_POINTS = np.empty((0, 3))
 _EMPTY = tr("The hand cloud will appear here. Hold a hand in front of the depth camera.")
 _FROM_CAMERA = tr("mm from the depth camera")
 _FROM_CURSOR = tr("mm from the centre of the cursor")
@@ -110,15 +108,20 @@ class _Cloud:
     role: str
     points_mm: Float64
     residuals_m: Float64 | None = None
+    reach_m: float = 0.0
+    """End of the residuals' colour scale."""
 
-    def drawn(self) -> tuple[Float64, UInt8]:
-        """Return at most `_MOST_POINTS` points, and their colours."""
+    def drawn(self) -> tuple[Float64, UInt8, Float64]:
+        """Return at most `_MOST_POINTS` points with their colours, and points without a partner."""
         every = slice(None, None, max(1, -(-len(self.points_mm) // _MOST_POINTS)))
         points_mm = self.points_mm[every]
-        if self.residuals_m is not None:
-            return points_mm, residual_colors(self.residuals_m[every])
-        color = np.array(rgb(getattr(colors(), self.role)), np.uint8)
-        return points_mm, np.tile(color, (len(points_mm), 1))
+        if self.residuals_m is None:
+            color = np.array(rgb(getattr(colors(), self.role)), np.uint8)
+            return points_mm, np.tile(color, (len(points_mm), 1)), _NONE
+        residuals_m = self.residuals_m[every]
+        is_outlier = np.isnan(residuals_m)
+        shades = residual_colors(residuals_m[~is_outlier], self.reach_m)
+        return points_mm[~is_outlier], shades, points_mm[is_outlier]
 
 
 class CloudPanel(QWidget):
@@ -210,21 +213,23 @@ class CloudPanel(QWidget):
         else:
             self._forget_pairs()
 
-    def show_alignment(self, alignment: Alignment, residuals_m: Float64 | None = None) -> None:
+    def show_alignment(self, alignment: Alignment, residuals_m: Float64, reach_m: float) -> None:
         """Show a finished alignment, its hand coloured by (M,) residuals; NaN for outliers.
 
-        Its cursor would cover the colours, and is hidden at first.
+        The colour scale ends at `reach_m`. Its cursor would cover the colours, and is hidden at
+        first.
         """
         T_E_W = alignment.T_E_W[alignment.eyes[0]]
         middle_m = np.median(transform(T_E_W, alignment.cursor_m), axis=0)
         axes = _Axes(T_E_W, middle_m, _FROM_CURSOR)
         self._forget_pairs()
         self._pairs.setEnabled(False)
-        role = "live" if residuals_m is None else RESIDUALS
+        self._scale.show_reach(reach_m)
+        hand_mm = axes.mm(alignment.hand_m)
         self._show(
             "solved-cursor",
             axes.mm(alignment.cursor_m),
-            _Cloud("hand", tr("Hand"), role, axes.mm(alignment.hand_m), residuals_m),
+            _Cloud("hand", tr("Hand"), RESIDUALS, hand_mm, residuals_m, reach_m),
             axes.name,
         )
 
@@ -296,11 +301,13 @@ class CloudPanel(QWidget):
     def _draw(self) -> None:
         shown = [cloud for cloud in self._clouds if cloud.layer not in self._hidden]
         drawn = [cloud.drawn() for cloud in shown]
-        points_mm = np.concatenate([_NONE, *(points for points, _ in drawn)])
-        shades = np.concatenate([np.empty((0, 3), np.uint8), *(shades for _, shades in drawn)])
+        points_mm = np.concatenate([_NONE, *(points for points, _, _ in drawn)])
+        shades = np.concatenate([np.empty((0, 3), np.uint8), *(shades for _, shades, _ in drawn)])
+        outliers_mm = np.concatenate([_NONE, *(outliers for _, _, outliers in drawn)])
         # Without a hand, the text says why there is none.
         is_hidden = not shown and any(cloud.layer == "hand" for cloud in self._clouds)
-        self._view.show_points(points_mm, shades, _HIDDEN if is_hidden else self._text)
+        text = _HIDDEN if is_hidden else self._text
+        self._view.show_points(points_mm, shades, text, outliers_mm)
 
     def _join(self, cursor: PlacedHand, hand: PlacedHand, rotation_W: Float64, axes: _Axes) -> None:
         now_s = time.monotonic()
@@ -341,8 +348,8 @@ class CloudView(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)  # as ImageView
-        self._points_mm, self._colors = _NO_POINTS, np.empty((0, 3), np.uint8)
-        self._from_mm = self._to_mm = _NO_POINTS
+        self._points_mm, self._colors = _NONE, np.empty((0, 3), np.uint8)
+        self._outliers_mm = self._from_mm = self._to_mm = _NONE
         self._text = ""
         self._box: Box | None = None
         self._orbit = Orbit()
@@ -357,7 +364,9 @@ class CloudView(QWidget):
         """The present view of the points."""
         return self._orbit
 
-    def show_points(self, points_mm: Float64, point_colors: UInt8, text: str) -> None:
+    def show_points(
+        self, points_mm: Float64, point_colors: UInt8, text: str, outliers_mm: Float64 = _NONE
+    ) -> None:
         """Show points with a caption, or a message if there are none; outliers are crosses.
 
         Parameters
@@ -367,7 +376,9 @@ class CloudView(QWidget):
         point_colors : (N, 3) uint8
             RGB.
         text : str
+        outliers_mm : (M, 3) float64
         """
+        self._outliers_mm = outliers_mm
         self._points_mm, self._colors, self._text = points_mm, point_colors, text
         if len(points_mm):
             smallest = Box.around(points_mm)
@@ -465,15 +476,11 @@ class CloudView(QWidget):
         points_px[:, :2] += np.divide(size, 2.0)
         background = rgb(colors().canvas)
         point_px = np.clip(_POINT_MM * self._orbit.px_per_mm, _LEAST_POINT_PX, _MOST_POINT_PX)
-        seen, shades = points_px, self._colors
-        # Channel by channel, a tenth of the time; a live cloud, painted for every frame, has none.
-        red, green, blue = (shades[:, i] == shade for i, shade in enumerate(rgb(OUTLIER)))
-        if (is_outlier := red & green & blue).any():
-            seen, shades = seen[~is_outlier], shades[~is_outlier]
-        image = splat(seen, shades, background, size, round(ratio * point_px))
+        image = splat(points_px, self._colors, background, size, round(ratio * point_px))
         painter.drawImage(QRectF(self.rect()), image)
-        painter.setPen(QPen(QColor(OUTLIER), 1))
-        draw_crosses(painter, points_px[is_outlier, :2] / ratio, point_px)
+        middle_px = np.array([self.width(), self.height()]) / 2.0
+        outliers_px = self._orbit.project(self._outliers_mm)[:, :2] + middle_px
+        draw_crosses(painter, outliers_px, point_px)
         painter.setPen(self.palette().windowText().color())
 
     def _paint_lines(self, painter: QPainter) -> None:

@@ -26,13 +26,13 @@ from handcal.core.geometry import transform
 from handcal.core.progress import Progress
 from handcal.core.types import EYES, METHODS, Alignment, Eye, EyeShift, Float64, Method
 from handcal.register.benefit import DISTANCES_M
-from handcal.register.results import Results, SolveSettings
+from handcal.register.results import Results, SolveSettings, residuals_reach_m
 from handcal.session.record import SessionRecord, eye_trials
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.keys import add_action
-from handcal_gui.app.theme import SPACING_PX, follow_theme
+from handcal_gui.app.theme import SPACING_PX, colors, follow_theme
 from handcal_gui.app.translation import tr
-from handcal_gui.calibrate.parts.residual_scale import LARGEST_MM, OUTLIER, residual_ramp
+from handcal_gui.calibrate.parts.residual_scale import residual_ramp
 from handcal_gui.calibrate.parts.result_card import ResultCard
 from handcal_gui.engine.jobs import Job
 from handcal_gui.widgets.brief import copy_text
@@ -504,13 +504,12 @@ class ResidualMap(Plot):
             "residual-map", tr("Residual map"), tr("Right (mm)"), tr("Down (mm)"), parent
         )
         self._shown = np.empty((0, 2)), np.empty(0)
+        self._reach_m = 1.0
         self.scatters = (
             pg.ScatterPlotItem(size=4, pen=None),
             pg.ScatterPlotItem(size=5, symbol="x"),
         )
-        self._bar = pg.ColorBarItem(
-            values=(0.0, LARGEST_MM), width=14, interactive=False, label=tr("Residual (mm)")
-        )
+        self._bar = pg.ColorBarItem(width=14, interactive=False, label=tr("Residual (mm)"))
         item = self.item
         item.setAspectLocked()
         item.invertY()
@@ -519,7 +518,7 @@ class ResidualMap(Plot):
         item.layout.addItem(self._bar, 2, 5)
         follow_theme(self, self._redraw)
 
-    def show_residuals(self, places_m: Float64, residuals_m: Float64) -> None:
+    def show_residuals(self, places_m: Float64, residuals_m: Float64, reach_m: float) -> None:
         """Show points.
 
         Parameters
@@ -528,8 +527,10 @@ class ResidualMap(Plot):
             Right and down, as seen from the eye.
         residuals_m : (N,) float64
             NaN for points without a partner.
+        reach_m : float
+            End of the colour scale.
         """
-        self._shown = places_m, residuals_m
+        self._shown, self._reach_m = (places_m, residuals_m), reach_m
         self._redraw()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -546,13 +547,14 @@ class ResidualMap(Plot):
         self._bar.setColorMap(palette)
         for side in ("left", "right"):
             self._bar.getAxis(side).setTextPen(self.palette().windowText().color())
+        self._bar.setLevels((0.0, 1e3 * self._reach_m))
         shades = [pg.mkBrush(c) for c in palette.getLookupTable(0.0, 1.0, _SHADES)]
-        shade = (_SHADES / LARGEST_MM * 1e3 * residuals_m[~is_outlier]).astype(int)
+        shade = (_SHADES / self._reach_m * residuals_m[~is_outlier]).astype(int)
         inliers, outliers = self.scatters
         inliers.setData(
             pos=1e3 * places_m[~is_outlier], brush=[shades[min(i, _SHADES - 1)] for i in shade]
         )
-        outliers.setData(pos=1e3 * places_m[is_outlier], pen=OUTLIER)
+        outliers.setData(pos=1e3 * places_m[is_outlier], pen=colors().muted)
 
 
 class ResidualsTab(QWidget):
@@ -570,13 +572,14 @@ class ResidualsTab(QWidget):
         super().__init__(parent)
         self.setObjectName("residuals")
         self._solved: dict[int, tuple[Alignment, Mapping[Eye, EyeShift]]] = {}
+        self._reach_m = 1.0
         self._choice = QComboBox()
         self._choice.setObjectName("residuals-choice")
         self._choice.setAccessibleName(tr("Alignment and eye"))
         self._choice.currentIndexChanged.connect(self._show_chosen)
         self._map = ResidualMap()
         note = QLabel(
-            tr("The hand as seen from the eye; a magenta × is a point without a partner (outlier).")
+            tr("The hand as seen from the eye; a grey × is a point without a partner (outlier).")
         )
         note.setWordWrap(True)
         vbox(self._choice, (self._map, 1), note, on=self, spacing=SPACING_PX)
@@ -588,6 +591,7 @@ class ResidualsTab(QWidget):
             for number, shifts in results.alignments.items()
             if number in alignments
         }
+        self._reach_m = residuals_reach_m(results) if self._solved else 1.0
         self._choice.clear()
         for number, (_, shifts) in self._solved.items():
             for eye in shifts:
@@ -604,10 +608,10 @@ class ResidualsTab(QWidget):
             return
         chosen = self._choice.currentData()
         if chosen is None:
-            self._map.show_residuals(np.empty((0, 2)), np.empty(0))
+            self._map.show_residuals(np.empty((0, 2)), np.empty(0), self._reach_m)
             return
         number, eye = chosen
         alignment, shifts = self._solved[number]
         hand_E_m = transform(alignment.T_E_W[eye], alignment.hand_m)
-        self._map.show_residuals(hand_E_m[:, :2], shifts[eye].residuals_m)
+        self._map.show_residuals(hand_E_m[:, :2], shifts[eye].residuals_m, self._reach_m)
         self.shown.emit(number, eye)

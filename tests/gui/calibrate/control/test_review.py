@@ -211,7 +211,7 @@ def test_the_alignment_whose_residuals_are_shown_is_in_the_hand_cloud(
 ) -> None:
     shown = []
     cloud = program.window.panels.cloud
-    monkeypatch.setattr(cloud, "show_alignment", lambda one, _residuals_m: shown.append(one))
+    monkeypatch.setattr(cloud, "show_alignment", lambda one, *_: shown.append(one))
     program.window.resize(1280, 900)
     program.review._show(_Stored(record, stored_solve_settings(record), results))
     program.window.show_page("review")
