@@ -6,9 +6,16 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from typing import Protocol
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QCloseEvent
-from PySide6.QtWidgets import QSizePolicy, QStackedWidget, QTabWidget, QToolButton, QWidget
+from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtGui import QCloseEvent, QKeyEvent
+from PySide6.QtWidgets import (
+    QApplication,
+    QSizePolicy,
+    QStackedWidget,
+    QTabWidget,
+    QToolButton,
+    QWidget,
+)
 
 from handcal.calibration.states import State
 from handcal.station.snapshot import Snapshot
@@ -139,9 +146,17 @@ class Section(QWidget):
         if is_apart:
             self.set_open(True)
         self._apart.setChecked(is_apart)
-        self.setWindowFlag(Qt.WindowType.Window, is_apart)
+        # The kind of window in which the keys of its main window work, too, such as the space bar.
+        self.setWindowFlag(Qt.WindowType.Tool, is_apart)
         self.show()
         self.asked.emit(self.is_open)
+
+    def event(self, event: QEvent) -> bool:
+        """Give keys that the panel does not take to the main window, as if it was still in it."""
+        owner = self.parentWidget()
+        if self.isWindow() and owner is not None and isinstance(event, QKeyEvent):
+            return QApplication.sendEvent(owner.window(), event)
+        return super().event(event)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Bring the panel back instead."""
