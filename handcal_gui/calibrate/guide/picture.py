@@ -136,9 +136,6 @@ class GuidePicture(QWidget):
             when = (tr(", before the calibration") if self._is_before else tr(", now")) * is_result
             origin = origin_text(view, is_solved=is_solved)
             self._titles[eye].setText(f"{EYE_NAMES[eye]}{origin}{when}")
-        has_image = any(view.image is not None for view in snapshot.views.values())
-        for entry in self._legend.values():
-            entry.show_on_image(has_image)
         has_cursor = any(len(view.cursor_px) for view in snapshot.views.values())
         self._legend["cursor"].setVisible(has_cursor or snapshot.procedure.cursor is not None)
         show_alike([self._eyes[eye] for eye in eyes])

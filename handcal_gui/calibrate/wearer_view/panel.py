@@ -70,9 +70,6 @@ class WearerViewPanel(QWidget):
             message = _CLOSED if is_closed else missing
             is_solved = procedure.results is not None and eye in procedure.results.eyes
             column.show_view(snapshot.views.get(eye), message, is_solved=is_solved)
-        has_image = any(view.image is not None for view in snapshot.views.values())
-        for entry in self._entries.values():
-            entry.show_on_image(has_image)
         show_alike([column.canvas for column in self._eyes.values()])
 
     def _lay_out(self, whole: QCheckBox, before: QCheckBox) -> None:
