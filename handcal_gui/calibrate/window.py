@@ -225,22 +225,6 @@ class MainWindow(QMainWindow):
         self.menus[menu].addAction(action)
         return action
 
-    def say_why_not(self, action: QAction, why: Callable[[], str]) -> None:
-        """Disable an action of the File menu, and show the reason in it, while there is one."""
-        text = action.text()
-
-        def show() -> None:
-            reason = why()
-            action.setEnabled(not reason)
-            action.setText(f"{text} ({reason})" if reason else text)
-
-        def end() -> None:  # its key says why, too
-            action.setEnabled(True)
-            action.setText(text)
-
-        self.menus["File"].aboutToShow.connect(show)
-        self.menus["File"].aboutToHide.connect(end)
-
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Make Return press the focused button, as Space does not, and Esc close the message."""
         if event.key() == Qt.Key.Key_Escape:
