@@ -194,7 +194,7 @@ class Autopilot(QObject):
         if view.main.action is Action.NEXT_WEARER:
             self._end(self.finished.emit)
         elif view.main.action in _ADDS and self._added == _MOST_ADDED:
-            self._wizard_panel.asked.emit(Action.NEXT)
+            self._wizard_panel.bar.do(Action.NEXT)
         elif view.main.action not in WEARERS:
             self._added += view.main.action in _ADDS
             self._wizard_panel.press_main()

@@ -177,4 +177,7 @@ class PreferencesDialog(QDialog):
         vbox(*parts, on=self, margins=SPACING_PX * 3 // 2, spacing=SPACING_PX)
         bar_px = area.verticalScrollBar().sizeHint().width()
         area.setMinimumWidth(self._fields.sizeHint().width() + bar_px)
-        self.resize(self.minimumWidth(), self._fields.sizeHint().height() + 20 * SPACING_PX)
+        self.resize(
+            self._fields.sizeHint().width() + 16 * SPACING_PX,
+            self._fields.sizeHint().height() + 20 * SPACING_PX,
+        )

@@ -287,7 +287,7 @@ class SeparateWindows(QObject):
     def _use_rig(self, path: Path) -> None:
         station = replace(self._current.now.station, rig=str(path))
         self._current.change(station=station)
-        self._start.set_rig(path)
+        self._start.new.form.set_rig(str(path))
 
     def _remember_export(self, settings: ExportSettings, folder: Path) -> None:
         self._current.change(export=settings, export_folder=str(folder))

@@ -141,7 +141,7 @@ def test_the_example_is_opened_from_the_start_page(
         one for one in program.start.findChildren(PathField) if one.name == "Session folder"
     )
     folder.set_path(entered)
-    program.start.example_requested.emit(tmp_path / "sessions")
+    program.start.open_example(tmp_path / "sessions")
     qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
     assert child(program, QLabel, "reviewContents").text().startswith("2 alignments, 6 trials")
     numbers = child(program, Table, "numbers-of-both-eyes").as_text()
@@ -149,7 +149,7 @@ def test_the_example_is_opened_from_the_start_page(
     assert program.window.findChild(QLabel, "reviewNote") is None
     program.show_start()
     assert program.start.new.settings.sessions == entered  # kept for the next wearer
-    program.start.example_requested.emit(tmp_path / "preferences.json" / "none")
+    program.start.open_example(tmp_path / "preferences.json" / "none")
     assert "preferences.json" in program.window.banner.text
 
 

@@ -143,7 +143,7 @@ def show_buttons(program: Program, snapshot: Snapshot, *, is_enabled: bool) -> l
     main = ButtonSpec(Action.TAKE_STEP, "Solve", is_enabled)
     say(program, snapshot, WizardView(Step.SOLVE, "", (), main, others))
     asked: list[object] = []
-    program.wizard_panel.asked.connect(asked.append)
+    program.wizard_panel.bar.do = asked.append
     for table in window.findChildren(Table):
         table.selectRow(0)
     return asked
@@ -272,7 +272,7 @@ def test_keys_move_the_outline_the_way_they_point_and_only_while_it_is_verified(
     window.activateWindow()
     qtbot.waitActive(window)
     moved: list[tuple[float, float, float]] = []
-    guide.nudged.connect(lambda *nudge: moved.append(nudge))
+    guide.nudge = lambda *nudge: moved.append(nudge)
     keys = (Qt.Key.Key_Left, Qt.Key.Key_Right, Qt.Key.Key_Up, Qt.Key.Key_Down)
     guide.start(begun())
     guide.show_snapshot(snapshot(State.ALIGN))

@@ -136,7 +136,7 @@ def test_keys_work_in_a_panel_that_is_a_window_of_its_own(
     window.show_page("live")
     offer_solve(window)
     asked: list[object] = []
-    program.wizard_panel.asked.connect(asked.append)
+    program.wizard_panel.bar.do = asked.append
     section = window.sections["results"]
     section.set_apart(True)
     section.activateWindow()
