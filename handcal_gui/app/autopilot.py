@@ -9,7 +9,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QEvent, QObject, QRegularExpression, Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QApplication, QDialog, QListWidget, QPushButton, QTabWidget, QWidget
+from PySide6.QtWidgets import QApplication, QDialog, QListWidget, QTabWidget, QWidget
 
 from handcal.camera.settings import RealSenseSettings
 from handcal.core.errors import FileError
@@ -253,14 +253,10 @@ class Screenshots:
 _LOOK_MS = 600
 """Time until a change is visible, on a busy computer, too."""
 _TURN_MS = 50
-_APART_MS = 1_100
-"""Least time between two presses of *Record trial* that the panel takes for two."""
 _PATIENCE_MS = 20_000
 _STEPS = 6
 _RAIL = QRegularExpression("Rail$")
 """Name of a list that chooses a window's page."""
-_OPENS_DIALOG = QRegularExpression("^(take|acceptRig|track)$")
-"""Names of buttons that open a dialog without asking for a file."""
 
 Walk = Iterator[int]
 """Actions in pieces; each yields the milliseconds to wait before the next."""
@@ -286,7 +282,6 @@ class Tour(QObject):
         super().__init__(program)
         self._program = program
         self._save = screenshots.save
-        self._opened: set[str] = set()
 
     def begin(self, walk: Walk, then: Callable[[], object]) -> None:
         """Run a walk, then call `then`."""
@@ -387,26 +382,12 @@ class Tour(QObject):
                     yield _LOOK_MS
                     if row > 0:
                         self._save(f"{name}-{row + 1}", dialog)
-                    yield from self._opened_by_buttons(name, dialog)
             dialog.close()
         manual = show_manual(program.window, "docs/guide.md")
         manual.search.setText("target")
         yield _LOOK_MS
         self._save("manual", manual)
         manual.close()
-
-    def _opened_by_buttons(self, name: str, dialog: QWidget) -> Walk:
-        """Save the dialogs that a page of a window opens, each once."""
-        for button in dialog.findChildren(QPushButton, _OPENS_DIALOG):
-            if not button.isVisible() or button.objectName() in self._opened:
-                continue
-            self._opened.add(button.objectName())
-            button.click()
-            yield _LOOK_MS
-            if (opened := QApplication.activeModalWidget()) is not None:
-                self._save(f"{name}-{button.objectName()}", opened)
-                opened.close()
-                yield _TURN_MS
 
     def _fine_tune(self) -> Walk:
         """Change φ, record trials with it, and reset it."""
@@ -420,27 +401,11 @@ class Tour(QObject):
         yield 2 * _LOOK_MS
         self._save("fine-tune-moved", panel)
         self._save("window-fine-tune")
-        yield from self._record_trial()
-        yield _APART_MS
-        self._record()  # for the other eye, whose φ is unchanged: the panel asks first
-        self._save("window-trial-doubt")
-        yield _APART_MS
-        yield from self._record_trial()
+        window.panels.trials.record_action.trigger()
+        yield 2 * _LOOK_MS
         panel.reset_action.trigger()
         yield 2 * _LOOK_MS
         self._save("fine-tune-back", panel)
-
-    def _record_trial(self) -> Walk:
-        wanted = self._trials() + 1
-        self._record()
-        yield from _until(lambda: self._trials() == wanted)
-
-    def _record(self) -> None:
-        self._program.window.panels.trials.record_action.trigger()
-
-    def _trials(self) -> int:
-        snapshot = self._program.live.snapshot
-        return len(snapshot.record.trials) if snapshot else 0
 
 
 def _until(holds: Callable[[], bool]) -> Walk:

@@ -8,9 +8,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 from PySide6.QtCore import QBuffer, QIODevice, QPointF, QRectF, Qt
-from PySide6.QtGui import QAction, QImage, QPainter, QPaintEvent, QPen, QResizeEvent
+from PySide6.QtGui import QAction, QImage, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import (
-    QBoxLayout,
     QComboBox,
     QFileDialog,
     QLabel,
@@ -157,7 +156,7 @@ class CameraPanel(QWidget):
 
 
 class _Pictures(QWidget):
-    """The two images, side by side or stacked, whichever makes them larger."""
+    """The two images, one above the other as in the narrow column of panels."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -174,11 +173,7 @@ class _Pictures(QWidget):
         hbox(
             (self._depth, 1), self._legend, on=self._depth_side, margins=0, spacing=SPACING_PX // 2
         )
-        self._layout = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
-        self._layout.setContentsMargins(0, 0, 0, 0)
-        self._layout.setSpacing(SPACING_PX)
-        self._layout.addWidget(self._color, 1)
-        self._layout.addWidget(self._depth_side, 1)
+        vbox((self._color, 1), (self._depth_side, 1), on=self, margins=0, spacing=SPACING_PX)
 
     def begin(self, depth_colors: DepthColors) -> None:
         self._depth_colors = depth_colors
@@ -216,14 +211,6 @@ class _Pictures(QWidget):
         if self._depth.has_image and not self._color.has_image:
             message = message or _NO_COLOR
         self._color.show_text(message=message, caption=caption if is_in_color else "")
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Stack the images if that makes them larger."""
-        super().resizeEvent(event)
-        width, height = 9 * self.width(), 16 * self.height()
-        is_stacked = min(width, height / 2) > min(width / 2, height)
-        directions = QBoxLayout.Direction
-        self._layout.setDirection(directions.TopToBottom if is_stacked else directions.LeftToRight)
 
 
 class _Status(QWidget):

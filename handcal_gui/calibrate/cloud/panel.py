@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -19,7 +20,7 @@ from PySide6.QtGui import (
     QPixmap,
     QWheelEvent,
 )
-from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QSizePolicy, QToolButton, QWidget
+from PySide6.QtWidgets import QCheckBox, QSizePolicy, QToolButton, QWidget
 
 from handcal.calibration.hands import PlacedHand
 from handcal.core.geometry import invert, transform
@@ -42,7 +43,8 @@ from handcal_gui.calibrate.parts.residual_scale import (
 )
 from handcal_gui.calibrate.parts.splat import rgb, splat
 from handcal_gui.widgets.elided_label import ElidedLabel
-from handcal_gui.widgets.layouts import vbox
+from handcal_gui.widgets.fields import with_name
+from handcal_gui.widgets.layouts import hbox, vbox
 
 NAMES = ("right", "down", "away")
 _GRID_MM = 50.0
@@ -68,12 +70,13 @@ _FROM_CURSOR = tr("mm from the centre of the cursor")
 _TURNED = tr("The live hand is rotated too far")
 _HIDDEN = tr("All points are hidden. Switch cursor or hand on below.")
 _DIRECTIONS = {
-    "front": (Direction.FRONT, tr("Front"), tr("As the wearer sees it (1)")),
-    "side": (Direction.SIDE, tr("Side"), tr("From the wearer's right (2)")),
-    "top": (Direction.TOP, tr("Top"), tr("From above (3)")),
+    "front": (Direction.FRONT, tr("Front"), "1", tr("As the wearer sees it (1)")),
+    "side": (Direction.SIDE, tr("Side"), "2", tr("From the wearer's right (2)")),
+    "top": (Direction.TOP, tr("Top"), "3", tr("From above (3)")),
     "reset": (
         Direction.ASLANT,
         tr("Reset"),
+        "R",
         tr("Oblique view of the whole scene (R, or double-click)"),
     ),
 }
@@ -234,23 +237,16 @@ class CloudPanel(QWidget):
         )
 
     def _lay_out(self) -> None:
-        controls, legend = QHBoxLayout(), QHBoxLayout()
-        controls.setSpacing(SPACING_PX // 2)
-        for name, (direction, text, tooltip) in _DIRECTIONS.items():
-            button = QToolButton()
-            button.setObjectName(f"cloud-{name}")
+        buttons = []
+        for name, (direction, text, _, tooltip) in _DIRECTIONS.items():
+            button = with_name(QToolButton(), f"cloud-{name}", text, tooltip)
             button.setText(text)
-            button.setToolTip(tooltip)
             button.clicked.connect(lambda _, direction=direction: self._view.look(direction))
-            controls.addWidget(button)
-        controls.addStretch()
-        controls.addWidget(self._pairs)
-        legend.setSpacing(SPACING_PX)
-        legend.addWidget(self._cursor)
-        legend.addWidget(self._hand, 1)
+            buttons.append(button)
+        controls = hbox(*buttons, 1, self._pairs, spacing=SPACING_PX // 2)
         unit = ElidedLabel()
         unit.setText(tr("points"))
-        legend.addWidget(unit)
+        legend = hbox(self._cursor, (self._hand, 1), unit, spacing=SPACING_PX)
         vbox(
             controls,
             (self._view, 1),
@@ -453,12 +449,11 @@ class CloudView(QWidget):
             (tr("Rotate down"), "Down", lambda: self._turn(0.0, turn)),
             (tr("Zoom in"), "+ =", lambda: self._change(self._orbit.zoomed(zoom))),
             (tr("Zoom out"), "-", lambda: self._change(self._orbit.zoomed(1.0 / zoom))),
-            (tr("Front"), "1", lambda: self.look(Direction.FRONT)),
-            (tr("Side"), "2", lambda: self.look(Direction.SIDE)),
-            (tr("Top"), "3", lambda: self.look(Direction.TOP)),
-            (tr("Reset"), "R", lambda: self.look(Direction.ASLANT)),
         ):
             add_action(self, text, keys, do, context=Qt.ShortcutContext.WidgetShortcut)
+        for direction, text, key, _ in _DIRECTIONS.values():
+            look = partial(self.look, direction)
+            add_action(self, text, key, look, context=Qt.ShortcutContext.WidgetShortcut)
 
     def _turn(self, yaw_rad: float, pitch_rad: float) -> None:
         self._orbit = self._orbit.turned(yaw_rad, pitch_rad)

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from PySide6.QtCore import QEvent, Qt, QTimer, Signal
+from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
 from PySide6.QtWidgets import (
     QApplication,
@@ -39,8 +39,6 @@ Check = Callable[[StationSettings, str, Progress], Mapping[Part, Finding]]
 _SETTLE_MS, _AGAIN_MS = 300, 3000
 _AGAIN_BY_PROCESS_MS = 10_000
 """For a RealSense, which another process looks for: 0.2 s of processor time."""
-_AGAIN_UNSEEN_MS = 60_000
-"""While another program has the keys: a camera plugged in meanwhile is found on return."""
 
 
 class NewCalibration(Card):
@@ -217,13 +215,6 @@ class NewCalibration(Card):
         self._wearer.setFocus()
         self.check()
 
-    def changeEvent(self, event: QEvent) -> None:
-        """Check the station when the window gets the keys again, unless that was just done."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.ActivationChange and self._again.isActive():
-            since_ms = self._again.interval() - self._again.remainingTime()
-            self._again.start(max(self._again_ms() - since_ms, 0))
-
     def hideEvent(self, event: QHideEvent) -> None:
         """Stop checking the station."""
         super().hideEvent(event)
@@ -231,8 +222,6 @@ class NewCalibration(Card):
         self._again.stop()
 
     def _again_ms(self) -> int:
-        if not self.isActiveWindow():
-            return _AGAIN_UNSEEN_MS
         return _AGAIN_BY_PROCESS_MS if self.settings.source == "realsense" else _AGAIN_MS
 
     def _question(self) -> tuple[StationSettings, str]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QImage
 from PySide6.QtWidgets import QComboBox, QFileDialog, QLabel, QMessageBox, QToolButton
 from pytestqt.qtbot import QtBot
@@ -79,23 +79,6 @@ def test_either_picture_or_both(
     combo.setCurrentText(mode)
     assert view(panel, "colour").isVisible() == color
     assert view(panel, "depth").isVisible() == depth
-
-
-def test_both_pictures_lie_where_they_are_larger(
-    panel: CameraPanel, snapshot: Maker, qtbot: QtBot
-) -> None:
-    panel.set_mode(Mode.BOTH)
-    panel.show_snapshot(snapshot())
-    color, depth = view(panel, "colour"), view(panel, "depth")
-    panel.resize(380, 420)
-    qtbot.waitUntil(lambda: _corner(depth).y() >= _corner(color).y() + color.height())
-    panel.resize(900, 320)
-    qtbot.waitUntil(lambda: _corner(depth).x() >= _corner(color).x() + color.width())
-    assert _corner(depth).y() == _corner(color).y()
-
-
-def _corner(view: ImageView) -> QPoint:
-    return view.mapTo(view.window(), QPoint())
 
 
 def test_the_hand_is_drawn_in_both_pictures(panel: CameraPanel, snapshot: Maker) -> None:

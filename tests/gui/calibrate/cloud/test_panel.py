@@ -190,7 +190,7 @@ def test_the_cursor_of_a_finished_alignment_is_shown_on_demand(
 
 def test_an_outlier_is_a_cross_in_the_view_and_in_its_key(qtbot: QtBot) -> None:
     view, scale = show(qtbot, CloudView(), 300, 300), show(qtbot, ResidualScale(), 300, 20)
-    cube_mm = 80.0 * (np.indices((2, 2, 2)).reshape(3, -1).T - 0.5)
+    cube_mm = (80.0 * (np.indices((2, 2, 2)).reshape(3, -1).T - 0.5)).astype(np.float64)
     view.show_points(cube_mm, np.zeros((8, 3), np.uint8), "mm", np.zeros((1, 3)))
     view.look(Direction.FRONT)
     for widget in (view, scale):
