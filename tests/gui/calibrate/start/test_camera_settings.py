@@ -8,7 +8,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.camera.settings import RealSenseSettings
 from handcal_gui.calibrate.start.camera_settings import CameraSettingsDialog
-from tests.gui.helpers import child, letters
+from tests.gui.helpers import letters
 
 ALL_SET = RealSenseSettings(
     serial="42",
@@ -81,18 +81,3 @@ def test_every_field_has_a_letter_of_its_own(qtbot: QtBot) -> None:
     for box in dialog.findChildren(QCheckBox):
         assert "&" in box.text()
         assert "&" not in box.accessibleName()
-
-
-def test_size_rate_and_the_other_exposure_are_said(qtbot: QtBot) -> None:
-    dialog = CameraSettingsDialog(RealSenseSettings())
-    qtbot.addWidget(dialog)
-    sizes = child(dialog, QComboBox, "profile")
-    for i in range(sizes.count()):
-        assert "848 × 480 px, 30 Hz" in sizes.itemText(i) or "1280 × 720 px, 30 Hz" in (
-            sizes.itemText(i)
-        )
-    assert (
-        child(dialog, QCheckBox, "wholeImage").text()
-        == "For the &whole image, even once a hand is found"
-    )
-    assert sizes.minimumWidth() == child(dialog, QComboBox, "preset").minimumWidth()

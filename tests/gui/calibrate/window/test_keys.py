@@ -35,20 +35,8 @@ from handcal_gui.calibrate.sections import TITLES
 from handcal_gui.calibrate.window import MainWindow
 from handcal_gui.engine.engine_thread import Command
 from handcal_gui.widgets.table import Table
-from tests.gui.calibrate.window.conftest import Maker, main_button, offer_solve, press, say
+from tests.gui.calibrate.window.conftest import Maker, main_button, press, say
 from tests.gui.views import begun
-
-
-def test_space_asks_for_what_comes_next_and_escape_closes_the_message(
-    window: MainWindow, qtbot: QtBot
-) -> None:
-    window.show_page("live")
-    offer_solve(window)
-    with qtbot.waitSignal(main_button(window).clicked, timeout=1000):
-        QTest.keyClick(window, Qt.Key.Key_Space)
-    window.banner.show_message("Could not solve")
-    QTest.keyClick(window, Qt.Key.Key_Escape)
-    assert window.banner.text == ""
 
 
 def test_keys_that_repeat_one_held_down_are_recognized(window: MainWindow) -> None:
