@@ -156,7 +156,7 @@ class CameraPanel(QWidget):
 
 
 class _Pictures(QWidget):
-    """The two images, one above the other as in the narrow column of panels."""
+    """The two images, side by side."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -173,7 +173,7 @@ class _Pictures(QWidget):
         hbox(
             (self._depth, 1), self._legend, on=self._depth_side, margins=0, spacing=SPACING_PX // 2
         )
-        vbox((self._color, 1), (self._depth_side, 1), on=self, margins=0, spacing=SPACING_PX)
+        hbox((self._color, 1), (self._depth_side, 1), on=self, margins=0, spacing=SPACING_PX)
 
     def begin(self, depth_colors: DepthColors) -> None:
         self._depth_colors = depth_colors
