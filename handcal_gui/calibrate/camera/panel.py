@@ -22,13 +22,12 @@ from handcal.calibration.sight import Observation
 from handcal.camera.feed import CameraStatus
 from handcal.core.errors import FileError
 from handcal.core.types import Float64, Frame, UInt8, UInt16
-from handcal.hand.outline import contour_px
 from handcal.hand.settings import SegmentSettings
 from handcal.io.files import write_atomic
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.theme import SPACING_PX, follow_theme, icon
 from handcal_gui.app.translation import tr
-from handcal_gui.calibrate.camera.hand_overlay import HandOverlay
+from handcal_gui.calibrate.camera.hand_overlay import overlays
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import let_keys_choose, plain_message, tool_button
 from handcal_gui.widgets.image_view import ImageView
@@ -192,17 +191,9 @@ class _Pictures(QWidget):
         self._depth.show_image(frame.depth)
 
     def show_hand(self, frame: Frame, seen: Observation) -> None:
-        if seen.cloud is None:
-            self._color.show_overlay(None)
-            self._depth.show_overlay(None)
-            return
-        cloud = seen.cloud
-        depth_px, color_px = contour_px(cloud, frame)
-        self._depth.show_overlay(HandOverlay(cloud, depth_px, depth_px, seen.is_over_limit).draw)
-        if color_px is not None:
-            self._color.show_overlay(
-                HandOverlay(cloud, depth_px, color_px, seen.is_over_limit).draw
-            )
+        of_depth, of_color = overlays(frame, seen)
+        self._depth.show_overlay(of_depth)
+        self._color.show_overlay(of_color)
 
     def show_text(self, *, message: str, caption: str = "") -> None:
         is_in_depth = not self._color.has_image and not self._depth_side.isHidden()

@@ -204,17 +204,12 @@ class StationForm(QWidget):
 
     def show_findings(self, findings: Mapping[Part, Finding]) -> None:
         """Show the finding about each part, with a button if one click can fix it."""
-        letters = set[str]()
         for part, finding in findings.items():
             fix, changes = _fix(part, finding, self.settings)
             mend: Callable[[], object] = partial(self._change, changes)
             is_awaited = finding.health is Health.LIMITED and self.settings.headset == "network"
             if part == "headset" and is_awaited and not fix:
                 fix, mend = tr("Co&nnect…"), self.connect_headset
-            letter = fix.partition("&")[2][:1]
-            if letter in letters:  # M, of which the camera comes first
-                fix = fix.replace("&", "")
-            letters.add(letter)
             self._findings[part].show_finding(finding, fix, mend)
 
     def edit_realsense(self) -> None:
@@ -385,5 +380,5 @@ def _fix(part: Part, finding: Finding, settings: StationSettings) -> tuple[str, 
     if part == "headset" and is_virtual and not is_simulated:
         return tr("Use a networ&k headset"), {"headset": "network"}
     if part == "rig" and is_broken and settings.rig:
-        return tr("Use the exa&mple"), {"rig": ""}
+        return tr("Use the example"), {"rig": ""}
     return "", {}

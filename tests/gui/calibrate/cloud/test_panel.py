@@ -268,13 +268,6 @@ def test_mouse_turns_moves_and_goes_back(panel: CloudPanel, snapshot: MakeSnapsh
     assert view.orbit == start
 
 
-def test_it_fits_into_a_small_dock(panel: CloudPanel, snapshot: MakeSnapshot) -> None:
-    panel.show_snapshot(snapshot(observation={"is_over_limit": True}))
-    hint = panel.minimumSizeHint()
-    assert hint.width() <= 300
-    assert hint.height() <= 220
-
-
 def test_a_low_view_gives_the_room_of_the_labels_to_the_cloud(qtbot: QtBot) -> None:
     side_mm = np.linspace(-50.0, 50.0, 5)
     cube_mm = np.stack(np.meshgrid(side_mm, side_mm, side_mm), axis=-1).reshape(-1, 3)
