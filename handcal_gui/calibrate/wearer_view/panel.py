@@ -32,10 +32,8 @@ _LEGEND = {
     "offline": (tr("Before"), tr("The hand's outline as drawn before calibration, with φ = 0")),
 }
 
-_SHAPE = 4.0 / 3.0
-"""Width of an eye's picture relative to its height, as mostly cropped to a hand."""
 _NUMBER_SCALE = 0.85
-"""Font scale at which both eyes' numbers fit side by side into a narrow dock."""
+"""Font scale at which both eyes' numbers fit side by side into a narrow column."""
 
 
 class WearerViewPanel(QWidget):
