@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from PySide6.QtCore import QEvent, QObject, QRegularExpression, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QObject, QRegularExpression, Qt, QTimer
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QDialog, QListWidget, QTabWidget, QWidget
 
@@ -52,13 +52,11 @@ class Demonstration(QObject):
         self._program = program
         self._output = output.absolute()
         self._screenshots = Screenshots(program.window, screenshots) if screenshots else None
-        self._tour = Tour(program, self._screenshots) if self._screenshots else None
+        self._tour = Tour(program, self._screenshots, self._fail) if self._screenshots else None
         self._has_toured = False
-        if self._tour:
-            self._tour.failed.connect(self._fail)
-        self._autopilot = Autopilot(program.live, program.wizard_panel, self._look)
-        self._autopilot.finished.connect(self._export)
-        self._autopilot.stuck.connect(self._fail)
+        self._autopilot = Autopilot(
+            program.live, program.wizard_panel, self._look, self._export, self._fail
+        )
         program.live.ended.connect(self._fail)
 
     def start(self, settings: StationSettings) -> None:
@@ -132,30 +130,26 @@ class Autopilot(QObject):
     ----------
     live : CalibrationController
     wizard_panel : WizardPanel
-    look : callable, optional
+    look : callable
         Called with every view that lasts, before its button is pressed; may block, or pause the
         autopilot.
-
-    Attributes
-    ----------
-    finished : Signal()
-        The session is finished.
-    stuck : Signal(str)
-        The wizard makes no progress; the step and the reason.
+    finish : callable
+        Called once the session is finished.
+    fail : callable
+        Called with the step and the reason if the wizard makes no progress.
     """
-
-    finished = Signal()
-    stuck = Signal(str)
 
     def __init__(
         self,
         live: CalibrationController,
         wizard_panel: WizardPanel,
-        look: Callable[[WizardView], None] = lambda _view: None,
+        look: Callable[[WizardView], object],
+        finish: Callable[[], object],
+        fail: Callable[[str], object],
     ) -> None:
         super().__init__(live)
         self._wizard_panel = wizard_panel
-        self._look = look
+        self._look, self._finish, self._fail = look, finish, fail
         self._view: WizardView | None = None
         self._since_s = self._moved_s = time.monotonic()
         self._moved_at = self._added = 0
@@ -182,7 +176,8 @@ class Autopilot(QObject):
             self._view, self._since_s = view, now_s
         steps = snapshot.number - self._moved_at
         if now_s - self._moved_s > _PATIENCE_S and steps > _PATIENCE_STEPS:
-            self._end(lambda: self.stuck.emit(self._complaint(view)))
+            self._is_done = True
+            self._fail(self._complaint(view))
         elif now_s - self._since_s > _LOOK_S:
             self._act(view)
 
@@ -192,16 +187,13 @@ class Autopilot(QObject):
         if self._is_paused or not (view.main.is_enabled or view.main.action in WEARERS):
             return
         if view.main.action is Action.NEXT_WEARER:
-            self._end(self.finished.emit)
+            self._is_done = True
+            self._finish()
         elif view.main.action in _ADDS and self._added == _MOST_ADDED:
             self._wizard_panel.bar.do(Action.NEXT)
         elif view.main.action not in WEARERS:
             self._added += view.main.action in _ADDS
             self._wizard_panel.press_main()
-
-    def _end(self, tell: Callable[[], None]) -> None:
-        self._is_done = True
-        tell()
 
     @staticmethod
     def _complaint(view: WizardView) -> str:
@@ -269,18 +261,15 @@ class Tour(QObject):
     ----------
     program : Program
     screenshots : Screenshots
-
-    Attributes
-    ----------
-    failed : Signal(str)
-        A screenshot could not be saved; the reason.
+    fail : callable
+        Called with the reason if a screenshot could not be saved.
     """
 
-    failed = Signal(str)
-
-    def __init__(self, program: Program, screenshots: Screenshots) -> None:
+    def __init__(
+        self, program: Program, screenshots: Screenshots, fail: Callable[[str], object]
+    ) -> None:
         super().__init__(program)
-        self._program = program
+        self._program, self._fail = program, fail
         self._save = screenshots.save
 
     def begin(self, walk: Walk, then: Callable[[], object]) -> None:
@@ -290,7 +279,7 @@ class Tour(QObject):
         except StopIteration:
             then()
         except FileError as error:
-            self.failed.emit(str(error))
+            self._fail(str(error))
         else:
             QTimer.singleShot(wait_ms, self, lambda: self.begin(walk, then))
 

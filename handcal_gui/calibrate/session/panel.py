@@ -89,11 +89,11 @@ class SessionPanel(QWidget):
         self.notes = NotesEditor()
         self._unwritten = paragraph("unwritten")
         self._unwritten.hide()
-        self._strip = UndoStrip(self)
-        self._strip.restore_requested.connect(
+        self._strip = UndoStrip(
+            self,
             lambda one: self.submit(
                 tr("restore the {}").format(one.kind), lambda s: s.restore(one.kind, one.number)
-            )
+            ),
         )
         self._tabs = RecordTabs()
         self._open_folder = QPushButton(tr("&Open folder"))
