@@ -47,18 +47,18 @@ class Panel(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """What the window does with a panel."""
+    """The place of a panel in the window, and the snapshots that it is given."""
 
     title: str
     side: Literal["left", "right", "tabs"]
     """Sections on either side of the page, and tabs below the right ones."""
     has_content: Callable[[Snapshot], bool] = lambda _: False
-    """Whether there is something to show, which opens its section."""
+    """Returns True if there is something to show, which opens its section."""
     is_of_stored: bool = False
     """True if it shows stored sessions, too."""
     shown: Literal["while visible", "always", "in turn"] = "while visible"
-    """When it is given snapshots: always if it may be used before the next one, or has a history;
-    in turn with others if it is slow to paint."""
+    """Always if it may be used before the next one, or has a history; in turn with others if it is
+    slow to paint."""
 
 
 def _at(*place: Any, **more: Any) -> dict[str, Place]:

@@ -178,7 +178,7 @@ class ResultBar(QWidget):
         copy = add_action(self, tr("Cop&y"), "", self.copy, tooltip=tr("Copy the result as text"))
         window = Qt.ShortcutContext.WindowShortcut
         ask = add_action(self, tr("Print the result"), "Ctrl+P", self._ask_printer, context=window)
-        ask.setIconText(tr("Print… (Ctrl+P)"))
+        ask.setIconText(tr("Print…"))
         self._blink_button, *others = map(tool_button, (self.blink, copy, ask))
         self.buttons = QWidget()
         hbox(self._blink_button, *others, on=self.buttons, margins=0, spacing=SPACING_PX)
