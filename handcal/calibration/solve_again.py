@@ -230,7 +230,7 @@ def read_former(path: Path, rig: Rig) -> Former:
         raise FileError(f"{path} has no alignment", "start without it")
     faulty = [verdict for verdict in results.verdicts.values() if verdict.name in _FAULTY]
     if faulty:
-        raise FileError(f"{path} is not a calibration to start from: {faulty[0].reason}")
+        raise FileError(f"{path} is not a calibration to start from. {faulty[0].reason}")
     fused = results.fused
     known = [one.at(fused.wearer_scale) for one in fused.all_observed]
     mean_m, covariance_m2 = posterior(fused.prior, known)

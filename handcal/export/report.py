@@ -27,7 +27,7 @@ from handcal.export.outcome import SessionOutcome, printable
 from handcal.export.tables import corner_rows, parameter_rows
 from handcal.io.settings import settings_json
 from handcal.register.benefit import BY_DISTANCE
-from handcal.register.results import Results
+from handcal.register.results import Results, residuals_reach_m
 from handcal.register.verdict_words import VERDICT_WORDS
 from handcal.report.cells import (
     extremes,
@@ -434,10 +434,7 @@ def _convergence(results: Results) -> Section:
 
 def _residuals(outcome: SessionOutcome, results: Results) -> Section:
     record = outcome.record
-    residuals_m = [
-        shift.residuals_m for each in results.alignments.values() for shift in each.values()
-    ]
-    most_mm = 1e3 * float(np.nanpercentile(np.concatenate(residuals_m), 98))
+    most_mm = 1e3 * residuals_reach_m(results)
 
     def draw(number: int, cells: Mapping[Eye, ResidualCells], axes: Sequence[Axes]) -> None:
         for ax, eye in zip(axes, EYES, strict=True):

@@ -145,6 +145,18 @@ class Results:
         return f"{self.method}, {count} alignment{'s' * (count != 1)}"
 
 
+def residuals_reach_m(results: Results) -> float:
+    """Return the end of a colour scale for the residuals of all alignments, in metres.
+
+    98 % of the residuals are smaller. The scale is the same for all alignments, so that they
+    compare.
+    """
+    residuals_m = [
+        shift.residuals_m for each in results.alignments.values() for shift in each.values()
+    ]
+    return float(np.nanpercentile(np.concatenate(residuals_m), 98))
+
+
 def solve_session(
     alignments: Mapping[int, Alignment] | Sequence[Alignment],
     rig: Rig,

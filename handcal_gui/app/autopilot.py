@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from PySide6.QtCore import QEvent, QObject, QRegularExpression, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QObject, QRegularExpression, Qt, QTimer
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QApplication, QDialog, QListWidget, QPushButton, QTabWidget, QWidget
+from PySide6.QtWidgets import QApplication, QDialog, QListWidget, QTabWidget, QWidget
 
 from handcal.camera.settings import RealSenseSettings
 from handcal.core.errors import FileError
@@ -52,13 +52,11 @@ class Demonstration(QObject):
         self._program = program
         self._output = output.absolute()
         self._screenshots = Screenshots(program.window, screenshots) if screenshots else None
-        self._tour = Tour(program, self._screenshots) if self._screenshots else None
+        self._tour = Tour(program, self._screenshots, self._fail) if self._screenshots else None
         self._has_toured = False
-        if self._tour:
-            self._tour.failed.connect(self._fail)
-        self._autopilot = Autopilot(program.live, program.wizard_panel, self._look)
-        self._autopilot.finished.connect(self._export)
-        self._autopilot.stuck.connect(self._fail)
+        self._autopilot = Autopilot(
+            program.live, program.wizard_panel, self._look, self._export, self._fail
+        )
         program.live.ended.connect(self._fail)
 
     def start(self, settings: StationSettings) -> None:
@@ -132,30 +130,26 @@ class Autopilot(QObject):
     ----------
     live : CalibrationController
     wizard_panel : WizardPanel
-    look : callable, optional
+    look : callable
         Called with every view that lasts, before its button is pressed; may block, or pause the
         autopilot.
-
-    Attributes
-    ----------
-    finished : Signal()
-        The session is finished.
-    stuck : Signal(str)
-        The wizard makes no progress; the step and the reason.
+    finish : callable
+        Called once the session is finished.
+    fail : callable
+        Called with the step and the reason if the wizard makes no progress.
     """
-
-    finished = Signal()
-    stuck = Signal(str)
 
     def __init__(
         self,
         live: CalibrationController,
         wizard_panel: WizardPanel,
-        look: Callable[[WizardView], None] = lambda _view: None,
+        look: Callable[[WizardView], object],
+        finish: Callable[[], object],
+        fail: Callable[[str], object],
     ) -> None:
         super().__init__(live)
         self._wizard_panel = wizard_panel
-        self._look = look
+        self._look, self._finish, self._fail = look, finish, fail
         self._view: WizardView | None = None
         self._since_s = self._moved_s = time.monotonic()
         self._moved_at = self._added = 0
@@ -182,7 +176,8 @@ class Autopilot(QObject):
             self._view, self._since_s = view, now_s
         steps = snapshot.number - self._moved_at
         if now_s - self._moved_s > _PATIENCE_S and steps > _PATIENCE_STEPS:
-            self._end(lambda: self.stuck.emit(self._complaint(view)))
+            self._is_done = True
+            self._fail(self._complaint(view))
         elif now_s - self._since_s > _LOOK_S:
             self._act(view)
 
@@ -192,16 +187,13 @@ class Autopilot(QObject):
         if self._is_paused or not (view.main.is_enabled or view.main.action in WEARERS):
             return
         if view.main.action is Action.NEXT_WEARER:
-            self._end(self.finished.emit)
+            self._is_done = True
+            self._finish()
         elif view.main.action in _ADDS and self._added == _MOST_ADDED:
-            self._wizard_panel.asked.emit(Action.NEXT)
+            self._wizard_panel.bar.do(Action.NEXT)
         elif view.main.action not in WEARERS:
             self._added += view.main.action in _ADDS
             self._wizard_panel.press_main()
-
-    def _end(self, tell: Callable[[], None]) -> None:
-        self._is_done = True
-        tell()
 
     @staticmethod
     def _complaint(view: WizardView) -> str:
@@ -253,14 +245,10 @@ class Screenshots:
 _LOOK_MS = 600
 """Time until a change is visible, on a busy computer, too."""
 _TURN_MS = 50
-_APART_MS = 1_100
-"""Least time between two presses of *Record trial* that the panel takes for two."""
 _PATIENCE_MS = 20_000
 _STEPS = 6
 _RAIL = QRegularExpression("Rail$")
 """Name of a list that chooses a window's page."""
-_OPENS_DIALOG = QRegularExpression("^(take|acceptRig|track)$")
-"""Names of buttons that open a dialog without asking for a file."""
 
 Walk = Iterator[int]
 """Actions in pieces; each yields the milliseconds to wait before the next."""
@@ -273,20 +261,16 @@ class Tour(QObject):
     ----------
     program : Program
     screenshots : Screenshots
-
-    Attributes
-    ----------
-    failed : Signal(str)
-        A screenshot could not be saved; the reason.
+    fail : callable
+        Called with the reason if a screenshot could not be saved.
     """
 
-    failed = Signal(str)
-
-    def __init__(self, program: Program, screenshots: Screenshots) -> None:
+    def __init__(
+        self, program: Program, screenshots: Screenshots, fail: Callable[[str], object]
+    ) -> None:
         super().__init__(program)
-        self._program = program
+        self._program, self._fail = program, fail
         self._save = screenshots.save
-        self._opened: set[str] = set()
 
     def begin(self, walk: Walk, then: Callable[[], object]) -> None:
         """Run a walk, then call `then`."""
@@ -295,7 +279,7 @@ class Tour(QObject):
         except StopIteration:
             then()
         except FileError as error:
-            self.failed.emit(str(error))
+            self._fail(str(error))
         else:
             QTimer.singleShot(wait_ms, self, lambda: self.begin(walk, then))
 
@@ -387,26 +371,12 @@ class Tour(QObject):
                     yield _LOOK_MS
                     if row > 0:
                         self._save(f"{name}-{row + 1}", dialog)
-                    yield from self._opened_by_buttons(name, dialog)
             dialog.close()
         manual = show_manual(program.window, "docs/guide.md")
         manual.search.setText("target")
         yield _LOOK_MS
         self._save("manual", manual)
         manual.close()
-
-    def _opened_by_buttons(self, name: str, dialog: QWidget) -> Walk:
-        """Save the dialogs that a page of a window opens, each once."""
-        for button in dialog.findChildren(QPushButton, _OPENS_DIALOG):
-            if not button.isVisible() or button.objectName() in self._opened:
-                continue
-            self._opened.add(button.objectName())
-            button.click()
-            yield _LOOK_MS
-            if (opened := QApplication.activeModalWidget()) is not None:
-                self._save(f"{name}-{button.objectName()}", opened)
-                opened.close()
-                yield _TURN_MS
 
     def _fine_tune(self) -> Walk:
         """Change φ, record trials with it, and reset it."""
@@ -420,27 +390,11 @@ class Tour(QObject):
         yield 2 * _LOOK_MS
         self._save("fine-tune-moved", panel)
         self._save("window-fine-tune")
-        yield from self._record_trial()
-        yield _APART_MS
-        self._record()  # for the other eye, whose φ is unchanged: the panel asks first
-        self._save("window-trial-doubt")
-        yield _APART_MS
-        yield from self._record_trial()
+        window.panels.trials.record_action.trigger()
+        yield 2 * _LOOK_MS
         panel.reset_action.trigger()
         yield 2 * _LOOK_MS
         self._save("fine-tune-back", panel)
-
-    def _record_trial(self) -> Walk:
-        wanted = self._trials() + 1
-        self._record()
-        yield from _until(lambda: self._trials() == wanted)
-
-    def _record(self) -> None:
-        self._program.window.panels.trials.record_action.trigger()
-
-    def _trials(self) -> int:
-        snapshot = self._program.live.snapshot
-        return len(snapshot.record.trials) if snapshot else 0
 
 
 def _until(holds: Callable[[], bool]) -> Walk:

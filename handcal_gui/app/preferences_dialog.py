@@ -21,7 +21,8 @@ from handcal_gui.widgets.fields import (
     whole_number,
     with_name,
 )
-from handcal_gui.widgets.layouts import scrollable, vbox
+from handcal_gui.widgets.finding_line import FindingLine
+from handcal_gui.widgets.layouts import keep_space, scrollable, vbox
 from handcal_gui.widgets.path_field import PathField
 
 _THEMES: dict[Theme, str] = {
@@ -80,38 +81,41 @@ class PreferencesDialog(QDialog):
         self.setObjectName("preferencesDialog")
         self.setWindowTitle(tr("Preferences"))
         self._preferences = preferences
-        self._theme = choice("theme", tr("Theme"), _THEMES)
-        self._sessions = PathField(tr("Session folder"), "folder")
-        self._calibration = CalibrationFields(explains=True)
-        self._target = number("target", 1.0, 60.0, 0.5, " ′", _TARGET_HELP)
         self._learn = choice("learnPrior", tr("Learned"), _LEARNED, _LEARN_HELP)
         host = preferences.bridges.slicer_host
         hosts = _SLICER if host in _SLICER else {**_SLICER, host: host}  # typed into the file
         self._slicer = choice("slicer", "OpenIGTLink", hosts, _SLICER_HELP)
         self._port = whole_number("slicerPort", 1, 65535, _PORT_HELP)
-        self._slicer.currentIndexChanged.connect(
-            lambda: self._port.setEnabled(bool(self._slicer.currentData()))
+        self._slicer.currentIndexChanged.connect(self._allow_port)
+        self._fields = fields = CalibrationFields("station.calibration.", has_letters=True)
+        fields.add(
+            tr("Tar&get"),
+            number("target", 1.0, 60.0, 0.5, " ′", _TARGET_HELP),
+            "station.calibration.solve.verdict.target_arcmin",
         )
-        self._lsl = with_name(QCheckBox(tr("Send &events")), "lsl", help_text=_LSL_HELP)
+        fields.add(tr("&Learned"), self._learn)
+        fields.add_heading(tr("Sent to other programs by the next calibrations"))
+        fields.add("Open&IGTLink", self._slicer, "bridges.slicer_host")
+        fields.add(tr("&Port"), self._port, "bridges.slicer_port")
+        events = with_name(QCheckBox(tr("Send &events")), "lsl", help_text=_LSL_HELP)
+        fields.add("LSL", events, "bridges.lsl")
+        fields.add_heading(tr("Program"))
+        fields.add(tr("The&me"), choice("theme", tr("Theme"), _THEMES), "theme")
+        fields.add(
+            tr("Session f&older"), PathField(tr("Session folder"), "folder"), "station.sessions"
+        )
+        make_equally_wide(fields.findChildren(QComboBox))
+        self._gate_found = FindingLine("gate")
+        keep_space(self._gate_found)
         self._buttons = QDialogButtonBox(
             QDialogButtonBox.StandardButton.Ok
             | QDialogButtonBox.StandardButton.Cancel
             | QDialogButtonBox.StandardButton.RestoreDefaults
         )
-        self._bound = Bound(
-            {
-                "theme": self._theme,
-                "bridges.slicer_host": self._slicer,
-                "bridges.slicer_port": self._port,
-                "bridges.lsl": self._lsl,
-                "station.sessions": self._sessions,
-                "station.calibration.solve.verdict.target_arcmin": self._target,
-            },
-            parent=self,
-        )
+        self._bound = Bound(fields.fields, fields.factors, self)
         self._lay_out()
         self._show(preferences)
-        self._calibration.changed.connect(self._refresh)
+        self._bound.changed.connect(self._refresh)
         self._refresh()
 
     def preferences(self) -> Preferences:
@@ -125,15 +129,14 @@ class PreferencesDialog(QDialog):
             learn_prior="eyes" in learned,
             use_far_prior="far" in learned,
             learn_wearers="wearers" in learned,
-            calibration=self._calibration.take(station.calibration),
         )
         return replace(shown, station=station)
 
     def _show(self, preferences: Preferences) -> None:
         """Show the values of preferences."""
         station = preferences.station
-        self._bound.show(preferences)
-        self._calibration.show_settings(station.calibration)
+        with self._fields.any_gate():
+            self._bound.show(preferences)
         words = {
             "eyes": station.learn_prior,
             "far": station.use_far_prior,
@@ -141,30 +144,20 @@ class PreferencesDialog(QDialog):
         }
         learned = " ".join(word for word, is_set in words.items() if is_set)
         self._learn.setCurrentIndex(max(0, self._learn.findData(learned)))
-        self._port.setEnabled(bool(preferences.bridges.slicer_host))
+        self._allow_port()
+
+    def _allow_port(self) -> None:
+        self._port.setEnabled(bool(self._slicer.currentData()))
 
     def _refresh(self) -> None:
         """Show what is wrong with the depth gate, and allow OK unless something is refused."""
         problem = gate_problem(self.preferences().station)
-        self._calibration.show_gate_problem(problem)
+        self._gate_found.setVisible(problem is not None)
+        if problem is not None:
+            self._gate_found.show_finding(problem)
         self._ok.setEnabled(problem is None)
 
     def _lay_out(self) -> None:
-        add = self._calibration.add_row
-        add(
-            tr("Tar&get"),
-            self._target,
-            tr("Largest expected error of an accepted eye; 60′ is 1°."),
-        )
-        add(tr("&Learned"), self._learn, tr("What earlier sessions tell of the next wearer."))
-        self._calibration.add_heading(tr("Sent to other programs by the next calibrations"))
-        add("Open&IGTLink", self._slicer, tr("Poses and results, for 3D Slicer; no password."))
-        add(tr("&Port"), self._port, tr("TCP port of OpenIGTLink on this computer."))
-        add("LSL", self._lsl, tr("Marks events in recordings of other instruments."))
-        self._calibration.add_heading(tr("Program"))
-        add(tr("The&me"), self._theme, tr("Colours of all windows."))
-        add(tr("Session f&older"), self._sessions)
-        make_equally_wide(self._calibration.findChildren(QComboBox))
         buttons = self._buttons
         for one in buttons.buttons():
             one.setIcon(QIcon())  # like all other buttons
@@ -175,15 +168,16 @@ class PreferencesDialog(QDialog):
         defaults.setText(tr("Restore &defaults"))
         defaults.setToolTip(tr("Shows the default of every field; Cancel keeps the former values."))
         defaults.clicked.connect(lambda: self._show(Preferences()))
-        area = scrollable(self._calibration)
+        area = scrollable(self._fields)
         about = paragraph(
             "about",
             tr("Change what you need and press OK. A running calibration keeps its settings."),
         )
-        margin_px = SPACING_PX * 3 // 2  # with it, all fields are in sight on a small screen
-        vbox(about, (area, 1), buttons, on=self, margins=margin_px, spacing=SPACING_PX)
-        form, foot = self._calibration.sizeHint(), about.sizeHint() + buttons.sizeHint()
+        parts = about, (area, 1), self._gate_found, buttons
+        vbox(*parts, on=self, margins=SPACING_PX * 3 // 2, spacing=SPACING_PX)
+        bar_px = area.verticalScrollBar().sizeHint().width()
+        area.setMinimumWidth(self._fields.sizeHint().width() + bar_px)
         self.resize(
-            form.width() + area.verticalScrollBar().sizeHint().width() + 4 * SPACING_PX,
-            form.height() + foot.height() + 5 * SPACING_PX,
+            self._fields.sizeHint().width() + 16 * SPACING_PX,
+            self._fields.sizeHint().height() + 20 * SPACING_PX,
         )

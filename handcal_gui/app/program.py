@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QApplication, QMessageBox
 from handcal.calibration.plan import with_eyes
 from handcal.calibration.solve_again import may_still_be_worn
 from handcal.core.errors import FileError
+from handcal.core.types import EyePlan
 from handcal.session.session import Session
 from handcal.station.settings import StationSettings
 from handcal.station.station import Station
@@ -22,24 +23,15 @@ from handcal_gui.app.preferences import CurrentPreferences, Preferences, Prefere
 from handcal_gui.app.separate_windows import SeparateWindows
 from handcal_gui.app.theme import use_theme
 from handcal_gui.app.translation import tr
-from handcal_gui.calibrate.camera.panel import CameraPanel
-from handcal_gui.calibrate.cloud.panel import CloudPanel
 from handcal_gui.calibrate.control.live import CalibrationController
 from handcal_gui.calibrate.control.review import ReviewController
-from handcal_gui.calibrate.fine_tune.panel import FineTunePanel
 from handcal_gui.calibrate.guide.view import Action
 from handcal_gui.calibrate.guide.wizard import WizardPanel
-from handcal_gui.calibrate.results.panel import ResultsPanel
 from handcal_gui.calibrate.review_page import ReviewPage
-from handcal_gui.calibrate.rotation.panel import RotationPanel
 from handcal_gui.calibrate.sections import Panels
-from handcal_gui.calibrate.session.panel import SessionPanel
 from handcal_gui.calibrate.start.example import copy_example
 from handcal_gui.calibrate.start.start_page import StartPage, ask_whether_worn
-from handcal_gui.calibrate.trials.panel import TrialsPanel
-from handcal_gui.calibrate.wearer_view.panel import WearerViewPanel
 from handcal_gui.calibrate.window import MainWindow
-from handcal_gui.connect.link_panel import LinkPanel
 from handcal_gui.widgets.fields import plain_message
 from handcal_gui.widgets.sentence import sentence
 
@@ -71,21 +63,10 @@ class Program(QObject):
         self._current = CurrentPreferences(file, remembers)
         self._use_theme()
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._use_theme)
-        panels = Panels(
-            camera=CameraPanel(),
-            cloud=CloudPanel(),
-            wearer_view=WearerViewPanel(),
-            rotation=RotationPanel(),
-            results=ResultsPanel(),
-            fine_tune=FineTunePanel(),
-            trials=TrialsPanel(),
-            session=SessionPanel(),
-            link=LinkPanel(),
-        )
         self.start = StartPage(self.preferences, self._current.pairings.open_key())
         self.wizard_panel = WizardPanel()
         review_page = ReviewPage()
-        self.window = MainWindow(self.start, self.wizard_panel, review_page, panels)
+        self.window = MainWindow(self.start, self.wizard_panel, review_page, Panels())
         self.live = CalibrationController(self.window, self.wizard_panel)
         self.review = ReviewController(self.window, review_page)
         self.windows = SeparateWindows(
@@ -212,8 +193,8 @@ class Program(QObject):
         self.start.new.cancel_requested.connect(self.live.cancel)
         self.start.unfinished.chosen.connect(self.resume_session)
         self.start.recent.chosen.connect(self.open_session)
-        self.start.example_requested.connect(self.open_example)
-        self.start.library_requested.connect(self.windows.show_library)
+        self.start.open_example = self.open_example
+        self.start.show_library = self.windows.show_library
         self.start.new.form.calibrate_rig.clicked.connect(lambda: self.windows.calibrate_rig())
         self.start.new.form.connect_headset = self.windows.connect_headset
         self.start.evaluate.clicked.connect(lambda: self.windows.evaluate())
@@ -231,9 +212,9 @@ class Program(QObject):
         review_page.resume_button.clicked.connect(self._resume_reviewed)
         review_page.again_button.clicked.connect(self._begin_from_shown)
         review_page.close_button.clicked.connect(self.show_start)
-        self.wizard_panel.eyes_chosen.connect(lambda eyes: self._current.change(plan=eyes))
-        self.wizard_panel.hold_changed.connect(
-            lambda is_held: self._current.change(runs_itself=not is_held)
+        self.wizard_panel.choose_eyes = self._choose_eyes
+        self.wizard_panel.remember_hold = lambda is_held: self._current.change(
+            runs_itself=not is_held
         )
         self.window.arrangement_changed.connect(
             lambda chosen: self._current.change(arrangement=chosen)
@@ -252,12 +233,9 @@ class Program(QObject):
         add("File", tr("&Next wearer"), "Ctrl+N", self._show_next_wearer)
         add("File", tr("&Open session…"), "Ctrl+O", self.windows.browse)
         add("File", tr("&Sessions…"), "Ctrl+L", self.windows.show_library)
-        export = add("File", tr("&Export…"), "Ctrl+E", self.windows.export)
-        openxr = add("File", tr("&Use in OpenXR programs…"), "", self.windows.use_in_openxr)
-        inspect = add("File", tr("&Inspect in 3D"), "", self.windows.inspect)
-        self.window.say_why_not(export, self.windows.why_no_export)
-        self.window.say_why_not(openxr, self.windows.why_no_export)
-        self.window.say_why_not(inspect, self.windows.why_no_inspection)
+        add("File", tr("&Export…"), "Ctrl+E", self.windows.export)
+        add("File", tr("&Use in OpenXR programs…"), "", self.windows.use_in_openxr)
+        add("File", tr("&Inspect in 3D"), "", self.windows.inspect)
         add("File", tr("Connect a &headset…"), "", self.windows.connect_headset)
         add("File", tr("&Calibrate a rig…"), "", self.windows.calibrate_rig)
         add("File", tr("E&valuate…"), "", self.windows.evaluate)
@@ -323,6 +301,10 @@ class Program(QObject):
         )
         return answer == buttons.Discard
 
+    def _choose_eyes(self, eyes: EyePlan) -> None:
+        self._current.change(plan=eyes)
+        self.live.choose_eyes(eyes)
+
     def _resume_reviewed(self) -> None:
         if self.review.record is not None:
             self.resume_session(self.review.record.path)
@@ -348,7 +330,7 @@ class Program(QObject):
         if QMessageBox.question(self.window, tr("New key"), question) != buttons.Yes:
             return
         self._current.renew_pairing_key()
-        self.start.set_pairing_key(self._current.pairings.open_key())
+        self.start.new.set_pairing_key(self._current.pairings.open_key())
         self.window.banner.show_message(
             tr("A new pairing key was made. Enter it in the headsets before the next calibration.")
         )

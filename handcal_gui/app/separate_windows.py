@@ -22,6 +22,8 @@ from handcal.export.export import (
     export_session,
     export_sessions,
 )
+from handcal.export.outcome import load_outcome
+from handcal.export.window_3d import inspect_session
 from handcal.link.server import HeadsetServer
 from handcal.rig.rig_file import read_rig
 from handcal.session.session import SessionRecord
@@ -32,13 +34,13 @@ from handcal_gui.app.preferences_dialog import PreferencesDialog
 from handcal_gui.app.support_dialog import SupportDialog
 from handcal_gui.app.theme import use_theme
 from handcal_gui.app.translation import tr
-from handcal_gui.calibrate.control.inspection import Inspection
 from handcal_gui.calibrate.control.live import CalibrationController
 from handcal_gui.calibrate.control.review import ReviewController
 from handcal_gui.calibrate.start.start_page import StartPage
 from handcal_gui.calibrate.window import MainWindow
 from handcal_gui.connect.connect_dialog import ConnectDialog
 from handcal_gui.connect.openxr_dialog import OpenxrDialog
+from handcal_gui.engine.jobs import Job
 from handcal_gui.evaluate.entries import EvaluationEntries, make_specs
 from handcal_gui.library.export_dialog import Export, ExportDialog
 from handcal_gui.widgets.numbers import pluralize
@@ -80,8 +82,7 @@ class SeparateWindows(QObject):
         self._window, self._start = window, start
         self._live, self._review = live, review
         self._current = current
-        self._inspection = Inspection(window)
-        self._inspection.failed.connect(window.banner.show_message)
+        self._inspection: Job | None = None
 
     @property
     def record(self) -> SessionRecord | None:
@@ -93,7 +94,7 @@ class SeparateWindows(QObject):
     def close(self) -> None:
         """End everything that was opened; safe to call twice."""
         self._ending.emit()
-        self._inspection.close()
+        self._end_inspection()
 
     def browse(self) -> None:
         """Let the user choose a session's folder, and open it."""
@@ -102,17 +103,6 @@ class SeparateWindows(QObject):
         )
         if folder:
             self._open_session(Path(folder))
-
-    def why_no_export(self) -> str:
-        """Return why the session shown cannot be exported; empty if it can, or if none is shown."""
-        record = self.record
-        return "" if record is None or record.is_solvable else tr("there is no result yet")
-
-    def why_no_inspection(self) -> str:
-        """Return why there is nothing to inspect; empty if there is."""
-        if self.record is None:
-            return tr("open a session first")
-        return "" if self.record.alignments else tr("there is no alignment yet")
 
     def export(self, folder: Path | None = None) -> ExportDialog | None:
         """Open the export dialog for the session shown, or the library to choose one.
@@ -128,8 +118,8 @@ class SeparateWindows(QObject):
         if record is None:
             self.show_library()
             return None
-        if why := self.why_no_export():
-            self._window.banner.show_message(tr("Nothing was exported: {}.").format(why))
+        if not record.is_solvable:
+            self._window.banner.show_message(tr("Nothing was exported: there is no result yet."))
             return None
 
         def export(target: Path, settings: ExportSettings, progress: Progress) -> Exported:
@@ -145,8 +135,8 @@ class SeparateWindows(QObject):
         if record is None:
             self.show_library()
             return None
-        if why := self.why_no_export():
-            self._window.banner.show_message(tr("Nothing can be used: {}.").format(why))
+        if not record.is_solvable:
+            self._window.banner.show_message(tr("Nothing can be used: there is no result yet."))
             return None
         dialog = OpenxrDialog(record, self._window)
         self._open(dialog, dialog.stop)
@@ -180,14 +170,26 @@ class SeparateWindows(QObject):
         return self._open_export(name, folder, export, title, parent)
 
     def inspect(self) -> None:
-        """Show the alignments of the session shown in a 3D window."""
+        """Show the alignments of the session shown in a 3D window, in place of one that is open."""
         record = self.record
         if record is None or not record.alignments:
-            why = self.why_no_inspection()
+            why = tr("there is no alignment yet") if record else tr("open a session first")
             self._window.banner.show_message(tr("There is nothing to inspect: {}.").format(why))
             return
         self._window.banner.show_notice(tr("The 3D window opens in a few seconds."))
-        self._inspection.start(record)
+
+        def work(progress: Progress) -> None:
+            inspect_session(load_outcome(record, progress), progress=progress)
+
+        self._end_inspection()
+        self._inspection = Job(work)
+        self._inspection.failed.connect(self._window.banner.show_message)
+        self._inspection.start()
+
+    def _end_inspection(self) -> None:
+        if self._inspection is not None:
+            self._inspection.abandon()
+            self._inspection = None
 
     def connect_headset(self) -> ConnectDialog | None:
         """Open the dialog that pairs and tries a headset; return None if it cannot be opened."""
@@ -284,7 +286,7 @@ class SeparateWindows(QObject):
     def _use_rig(self, path: Path) -> None:
         station = replace(self._current.now.station, rig=str(path))
         self._current.change(station=station)
-        self._start.set_rig(path)
+        self._start.new.form.set_rig(str(path))
 
     def _remember_export(self, settings: ExportSettings, folder: Path) -> None:
         self._current.change(export=settings, export_folder=str(folder))

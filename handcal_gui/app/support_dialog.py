@@ -14,9 +14,9 @@ from handcal.station.checks.doctor import Finding, Health
 from handcal.station.checks.support import SupportSettings, run_support
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
-from handcal_gui.engine.jobs import Job
 from handcal_gui.widgets.fields import button, label_for, main_button, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
+from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.path_field import PathField
 
@@ -47,14 +47,15 @@ class SupportDialog(QDialog):
         self.setObjectName("supportDialog")
         self.setWindowTitle(tr("Support bundle"))
         self._settings = settings
-        self._job: Job | None = None
         self._folder = PathField(tr("Folder"), "folder")
         self._folder.set_path(str(folder))
         self._folder.setMinimumWidth(45 * SPACING_PX)
         self._frames = PathField(tr("Recording to add"), "either", empty=tr("None"))
         self._name = f"handcal-support-{date.today():%Y%m%d}.zip"
-        self._will = tr("The file {} will be written to the folder.").format(self._name)
-        self._doing = paragraph("supportDoing", self._will)
+        will = tr("The file {} will be written to the folder.").format(self._name)
+        self._jobs = JobBar()
+        self._jobs.failed.connect(lambda why: self._say(Finding("", Health.BROKEN, why, _ADVICE)))
+        self._jobs.busy_changed.connect(self._on_busy)
         self._said = FindingLine("support")
         self._said.hide()
         self._write = main_button("writeBundle", tr("&Write"))
@@ -62,14 +63,15 @@ class SupportDialog(QDialog):
         self._folder.changed.connect(lambda: self._write.setEnabled(bool(self._folder.path)))
         self._write.clicked.connect(self.write)
         close.clicked.connect(self.reject)
-        self.finished.connect(self.stop)
+        self.finished.connect(self._jobs.stop)
         form = QFormLayout()
         form.addRow(label_for(self._folder, tr("&Folder")), self._folder)
         form.addRow(label_for(self._frames, tr("&Recording to add")), self._frames)
         vbox(
             paragraph("supportAbout", _ABOUT),
             form,
-            self._doing,
+            paragraph("supportWill", will),
+            self._jobs,
             self._said,
             1,
             hbox(1, close, self._write, spacing=SPACING_PX),
@@ -80,8 +82,6 @@ class SupportDialog(QDialog):
 
     def write(self) -> None:
         """Write the bundle."""
-        if self._job is not None:
-            return
         output = user_path(self._folder.path) / self._name
         frames = Path(self._frames.path) if self._frames.path else None
         settings = replace(self._settings, frames=frames)
@@ -90,34 +90,17 @@ class SupportDialog(QDialog):
             written = run_support(output, settings, progress)
             return tr("{} was written; it contains {}.").format(output, ", ".join(written[:5]))
 
-        self._set_writing(True)
-        self._job = Job(work)
         self._said.hide()
-        self._job.progressed.connect(lambda doing, _: self._doing.setText(f"{doing}…"))
-        self._job.succeeded.connect(lambda said: self._end(Finding("", Health.GOOD, said)))
-        self._job.failed.connect(lambda why: self._end(Finding("", Health.BROKEN, why, _ADVICE)))
-        self._job.cancelled.connect(self._end)
-        self._job.start()
+        self._jobs.run(tr("Writing"), work, lambda said: self._say(Finding("", Health.GOOD, said)))
 
     def stop(self) -> None:
         """Cancel the writing; safe to call twice."""
-        if self._job is not None:
-            self._job.abandon()
-            self._job = None
+        self._jobs.stop()
 
-    def _end(self, found: Finding | None = None) -> None:
-        assert self._job is not None
-        self._job.wait()
-        self._job = None
-        self._doing.clear()
-        self._set_writing(False)
-        self._show(found)
-
-    def _set_writing(self, is_writing: bool) -> None:
+    def _on_busy(self, is_busy: bool) -> None:
         for part in (self._folder, self._frames, self._write):
-            part.setEnabled(not is_writing)
+            part.setEnabled(not is_busy)
 
-    def _show(self, found: Finding | None) -> None:
-        self._said.setVisible(found is not None)
-        if found is not None:
-            self._said.show_finding(found)
+    def _say(self, found: Finding) -> None:
+        self._said.show_finding(found)
+        self._said.show()

@@ -160,7 +160,6 @@ _BOXES = (
     "QTableView",
     "QTreeView",
     "Card",
-    "VerdictCard",
 )
 """Widgets whose edges must be visible in the dark theme, too."""
 _ITEMS = "QListWidget", "QTableView", "QTreeView"

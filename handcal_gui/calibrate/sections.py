@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields
-from typing import Protocol
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal, Protocol
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QCloseEvent
-from PySide6.QtWidgets import QSizePolicy, QStackedWidget, QTabWidget, QToolButton, QWidget
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QCloseEvent, QKeyEvent
+from PySide6.QtWidgets import (
+    QApplication,
+    QSizePolicy,
+    QStackedWidget,
+    QTabWidget,
+    QToolButton,
+    QWidget,
+)
 
 from handcal.calibration.states import State
 from handcal.station.snapshot import Snapshot
@@ -26,22 +33,6 @@ from handcal_gui.calibrate.wearer_view.panel import WearerViewPanel
 from handcal_gui.connect.link_panel import LinkPanel
 from handcal_gui.widgets.layouts import hbox, vbox
 
-TITLES = {
-    "camera": tr("Camera"),
-    "cloud": tr("Hand cloud"),
-    "wearer_view": tr("Wearer's view"),
-    "rotation": tr("Rotation"),
-    "results": tr("Results"),
-    "fine_tune": tr("Fine-tune"),
-    "trials": tr("Trials"),
-    "session": tr("Session"),
-    "link": tr("Link"),
-}
-"""Of the panels, in the order of their keys, Ctrl+1 and so on."""
-LEFT, RIGHT = ("camera", "cloud", "rotation"), ("results", "fine_tune")
-TABS = ("wearer_view", "trials", "session", "link")
-"""Panels in sections on either side of the page, and in tabs below the right ones."""
-
 
 class Panel(Protocol):
     """The interface of every panel."""
@@ -55,55 +46,116 @@ class Panel(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Panels:
-    """All panels of the window."""
+class Place:
+    """The place of a panel in the window, and the snapshots that it is given."""
 
-    camera: CameraPanel
-    cloud: CloudPanel
-    wearer_view: WearerViewPanel
-    rotation: RotationPanel
-    results: ResultsPanel
-    fine_tune: FineTunePanel
-    trials: TrialsPanel
-    session: SessionPanel
-    link: LinkPanel
+    title: str
+    side: Literal["left", "right", "tabs"]
+    """Sections on either side of the page, and tabs below the right ones."""
+    has_content: Callable[[Snapshot], bool] = lambda _: False
+    """Returns True if there is something to show, which opens its section."""
+    is_of_stored: bool = False
+    """True if it shows stored sessions, too."""
+    shown: Literal["while visible", "always", "in turn"] = "while visible"
+    """Always if it may be used before the next one, or has a history; in turn with others if it is
+    slow to paint."""
+
+
+def _at(*place: Any, **more: Any) -> dict[str, Place]:
+    """Return the place of a panel as its field holds it."""
+    return {"place": Place(*place, **more)}
+
+
+def _has_frame(snapshot: Snapshot) -> bool:
+    return snapshot.frame is not None
+
+
+def _has_results(snapshot: Snapshot) -> bool:
+    return snapshot.procedure.results is not None
+
+
+def _has_cursor(snapshot: Snapshot) -> bool:
+    return snapshot.procedure.cursor is not None
+
+
+def _is_applied(snapshot: Snapshot) -> bool:
+    return _has_results(snapshot) and snapshot.procedure.state is State.APPLIED
+
+
+@dataclass(frozen=True, slots=True)
+class Panels:
+    """All panels of the window, in the order of their keys, Ctrl+1 and so on.
+
+    A panel is added here, and nowhere else in the window.
+    """
+
+    camera: CameraPanel = field(
+        default_factory=CameraPanel, metadata=_at(tr("Camera"), "left", _has_frame)
+    )
+    cloud: CloudPanel = field(
+        default_factory=CloudPanel,
+        metadata=_at(tr("Hand cloud"), "left", _has_frame, is_of_stored=True, shown="in turn"),
+    )
+    wearer_view: WearerViewPanel = field(
+        default_factory=WearerViewPanel, metadata=_at(tr("Wearer's view"), "tabs", shown="in turn")
+    )
+    rotation: RotationPanel = field(
+        default_factory=RotationPanel, metadata=_at(tr("Rotation"), "left", _has_cursor)
+    )
+    results: ResultsPanel = field(
+        default_factory=ResultsPanel,
+        metadata=_at(tr("Results"), "right", _has_results, is_of_stored=True),
+    )
+    fine_tune: FineTunePanel = field(
+        default_factory=FineTunePanel,
+        metadata=_at(tr("Fine-tune"), "right", _is_applied, shown="always"),
+    )
+    trials: TrialsPanel = field(
+        default_factory=TrialsPanel,
+        metadata=_at(tr("Trials"), "tabs", is_of_stored=True, shown="always"),
+    )
+    session: SessionPanel = field(
+        default_factory=SessionPanel, metadata=_at(tr("Session"), "tabs", is_of_stored=True)
+    )
+    link: LinkPanel = field(
+        default_factory=LinkPanel, metadata=_at(tr("Link"), "tabs", shown="always")
+    )
 
     def all(self) -> Iterator[Panel]:
         """Return an iterator over all panels."""
-        return (getattr(self, field.name) for field in fields(self))
+        return (getattr(self, name) for name in PLACES)
+
+    def shown(self, when: Literal["always", "in turn"]) -> list[Panel]:
+        """Return the panels that are given snapshots always, or in turn."""
+        return [getattr(self, name) for name, place in PLACES.items() if place.shown == when]
 
 
-def with_content(snapshot: Snapshot) -> Mapping[str, bool]:
-    """Return whether each section has something to show."""
-    procedure, has_frame = snapshot.procedure, snapshot.frame is not None
-    is_solved = procedure.results is not None
-    return {
-        "camera": has_frame,
-        "cloud": has_frame,
-        "rotation": procedure.cursor is not None,
-        "results": is_solved,
-        "fine_tune": is_solved and procedure.state is State.APPLIED,
-    }
+PLACES: dict[str, Place] = {one.name: one.metadata["place"] for one in fields(Panels)}
+TITLES = {name: place.title for name, place in PLACES.items()}
+LEFT, RIGHT, TABS = (
+    tuple(name for name, place in PLACES.items() if place.side == side)
+    for side in ("left", "right", "tabs")
+)
 
 
 class Section(QWidget):
     """A panel below its title; it can also be a window of its own.
 
-    Attributes
+    Parameters
     ----------
-    asked : Signal(bool)
-        The user opens or folds it.
+    name : str
+    panel : QWidget
+    choose : callable
+        Called when the user opens or folds it.
     """
 
-    asked = Signal(bool)
-
-    def __init__(self, name: str, panel: QWidget) -> None:
+    def __init__(self, name: str, panel: QWidget, choose: Callable[[bool], object]) -> None:
         super().__init__()
         title = TITLES[name]
         self.setObjectName(f"{name}Section")
         self.setWindowTitle(title)
         self.setProperty("panel", title)
-        self._panel = panel
+        self._panel, self._choose = panel, choose
         self._title = _title_button()
         self._title.setText(title)
         self._title.setObjectName(f"{name}Title")
@@ -111,7 +163,7 @@ class Section(QWidget):
         self._title.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         keys = native(f"Ctrl+{list(TITLES).index(name) + 1}")
         self._title.setToolTip(tr("Open or fold {} ({})").format(title, keys))
-        self._title.clicked.connect(self.asked)
+        self._title.clicked.connect(lambda: choose(self.is_open))
         self._apart = _title_button()
         self._apart.setToolTip(tr("In a window of its own, or back beside the guide"))
         self._apart.setAccessibleName(tr("{} in a window of its own").format(title))
@@ -139,9 +191,17 @@ class Section(QWidget):
         if is_apart:
             self.set_open(True)
         self._apart.setChecked(is_apart)
-        self.setWindowFlag(Qt.WindowType.Window, is_apart)
+        # The kind of window in which the keys of its main window work, too, such as the space bar.
+        self.setWindowFlag(Qt.WindowType.Tool, is_apart)
         self.show()
-        self.asked.emit(self.is_open)
+        self._choose(self.is_open)
+
+    def event(self, event: QEvent) -> bool:
+        """Give keys that the panel does not take to the main window, as if it was still in it."""
+        owner = self.parentWidget()
+        if self.isWindow() and owner is not None and isinstance(event, QKeyEvent):
+            return QApplication.sendEvent(owner.window(), event)
+        return super().event(event)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Bring the panel back instead."""
@@ -159,16 +219,16 @@ def _title_button() -> QToolButton:
 class Tabs(QTabWidget):
     """Panels in tabs; a click on the tab in front folds them, on any other tab opens them.
 
-    Attributes
+    Parameters
     ----------
-    asked : Signal(bool)
-        The user opens or folds them.
+    panels : mapping of str to QWidget
+    choose : callable
+        Called when the user opens or folds them.
     """
 
-    asked = Signal(bool)
-
-    def __init__(self, panels: Mapping[str, QWidget]) -> None:
+    def __init__(self, panels: Mapping[str, QWidget], choose: Callable[[bool], object]) -> None:
         super().__init__()
+        self._choose = choose
         self.setObjectName("tabs")
         self.setDocumentMode(True)
         self._names = list(panels)
@@ -209,7 +269,7 @@ class Tabs(QTabWidget):
 
     def _on_clicked(self, index: int) -> None:
         if index >= 0:
-            self.asked.emit(not self._is_open or index != self.currentIndex())
+            self._choose(not self._is_open or index != self.currentIndex())
 
 
 def column(*parts: QWidget) -> QWidget:

@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
     QScrollArea,
     QSplitter,
     QStackedWidget,
+    QStatusBar,
     QWidget,
 )
 
@@ -23,10 +24,10 @@ from handcal.station.snapshot import Snapshot
 from handcal_gui.app.keys import keep_focus_off_clicked_buttons, press
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
-from handcal_gui.calibrate.guide.action_bar import BottomStrip
 from handcal_gui.calibrate.guide.wizard import WizardPanel
 from handcal_gui.calibrate.sections import (
     LEFT,
+    PLACES,
     RIGHT,
     TABS,
     TITLES,
@@ -35,7 +36,6 @@ from handcal_gui.calibrate.sections import (
     Tabs,
     column,
     share_height,
-    with_content,
 )
 from handcal_gui.calibrate.start.start_page import StartPage
 from handcal_gui.widgets.banner import Banner
@@ -46,8 +46,6 @@ Page = Literal["start", "live", "review"]
 Arrangement = Literal["panels", "station"]
 _SHARES = (0.22, 0.315)
 """Of the window's width, for the columns of panels; what the user drags replaces them."""
-_REVIEW = frozenset({"cloud", "results", "trials", "session"})
-"""Panels of a stored session."""
 _MENUS = {
     "File": tr("&File"),
     "Edit": tr("&Edit"),
@@ -93,11 +91,13 @@ class MainWindow(QMainWindow):
         self.may_close: Callable[[], bool] = lambda: True
         self.panels = panels
         self.banner = Banner()
-        self.sections = {name: Section(name, getattr(panels, name)) for name in (*LEFT, *RIGHT)}
-        self.tabs = Tabs({name: getattr(panels, name) for name in TABS})
+        self.sections = {
+            name: Section(name, getattr(panels, name), partial(self._choose, name))
+            for name in (*LEFT, *RIGHT)
+        }
+        of_tabs = {name: getattr(panels, name) for name in TABS}
+        self.tabs = Tabs(of_tabs, partial(self._choose, "tabs"))
         self._parts: dict[str, Section | Tabs] = {**self.sections, "tabs": self.tabs}
-        for name, one in self._parts.items():
-            one.asked.connect(partial(self._choose, name))
         # Keys that work in the whole window work while their panel is folded, too.
         self._far_reaching = {
             name: [
@@ -136,7 +136,10 @@ class MainWindow(QMainWindow):
         self._splitter.splitterMoved.connect(self._keep_shares)
         self.setCentralWidget(self._splitter)
         self._bar = wizard.bar
-        self.setStatusBar(BottomStrip(self._bar))
+        strip = QStatusBar()
+        strip.setSizeGripEnabled(False)  # it appears and disappears, and moves the bar
+        strip.addPermanentWidget(self._bar, 1)
+        self.setStatusBar(strip)
         self._make_menus()
         wizard.add_switch(self._station)
         keep_focus_off_clicked_buttons(self)
@@ -176,7 +179,7 @@ class MainWindow(QMainWindow):
 
     def follow(self, snapshot: Snapshot) -> None:
         """Open the sections that have something to show; the rotation only while it matters."""
-        filled = {name for name, has_content in with_content(snapshot).items() if has_content}
+        filled = {name for name, place in PLACES.items() if place.has_content(snapshot)}
         opened = (self._opened | filled) - ({"rotation"} - filled)
         if opened != self._opened:
             self._opened = opened
@@ -225,22 +228,6 @@ class MainWindow(QMainWindow):
         self.menus[menu].addAction(action)
         return action
 
-    def say_why_not(self, action: QAction, why: Callable[[], str]) -> None:
-        """Disable an action of the File menu, and show the reason in it, while there is one."""
-        text = action.text()
-
-        def show() -> None:
-            reason = why()
-            action.setEnabled(not reason)
-            action.setText(f"{text} ({reason})" if reason else text)
-
-        def end() -> None:  # its key says why, too
-            action.setEnabled(True)
-            action.setText(text)
-
-        self.menus["File"].aboutToShow.connect(show)
-        self.menus["File"].aboutToHide.connect(end)
-
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Make Return press the focused button, as Space does not, and Esc close the message."""
         if event.key() == Qt.Key.Key_Escape:
@@ -275,7 +262,7 @@ class MainWindow(QMainWindow):
     def _offered(self) -> frozenset[str]:
         """Return the panels of the page in its arrangement."""
         if self._page == "review":
-            return _REVIEW
+            return frozenset(name for name, place in PLACES.items() if place.is_of_stored)
         is_shown = self._page == "live" and self._arrangement == "panels"
         return frozenset(TITLES) if is_shown else frozenset()
 

@@ -112,11 +112,6 @@ class Plot(QWidget):
         self.item.addItem(written)
         self._texts.append(written)
 
-    @property
-    def widest_text_px(self) -> float:
-        """Width of the widest text; 0 without any."""
-        return max((one.boundingRect().width() for one in self._texts), default=0.0)
-
     def clear(self) -> None:
         """Remove all lines and texts."""
         for item in (*(line for line, _, _ in self._lines), *self._texts):

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import cv2
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPen, QTransform
 
-from handcal.core.types import Bool, Float64, HandCloud
+from handcal.calibration.sight import Observation
+from handcal.core.types import Bool, Float64, Frame, HandCloud
+from handcal.hand.outline import contour_px
 from handcal_gui.app.theme import colors
 
+Draw: TypeAlias = Callable[[QPainter], None]
 _MASK_ALPHA = 70
 _LINE_PX = 2.0
 _SMOOTHED_PX = 1.0
@@ -62,6 +67,19 @@ class HandOverlay:
         _set_pen(painter, QColor(colors().muted), Qt.PenStyle.SolidLine)
         painter.drawRect(QRectF(x0 - 0.5, y0 - 0.5, x1 - x0, y1 - y0))
         painter.restore()
+
+
+def overlays(frame: Frame, seen: Observation) -> tuple[Draw | None, Draw | None]:
+    """Return what draws the hand over the depth image and over the colour image, if it is seen."""
+    if seen.cloud is None:
+        return None, None
+    depth_px, color_px = contour_px(seen.cloud, frame)
+    return (
+        HandOverlay(seen.cloud, depth_px, depth_px, seen.is_over_limit).draw,
+        None
+        if color_px is None
+        else HandOverlay(seen.cloud, depth_px, color_px, seen.is_over_limit).draw,
+    )
 
 
 def contour_runs(points_px: Float64, is_cut: Bool) -> list[tuple[Float64, bool]]:

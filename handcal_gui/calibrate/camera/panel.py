@@ -8,9 +8,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 from PySide6.QtCore import QBuffer, QIODevice, QPointF, QRectF, Qt
-from PySide6.QtGui import QAction, QImage, QPainter, QPaintEvent, QPen, QResizeEvent
+from PySide6.QtGui import QAction, QImage, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import (
-    QBoxLayout,
     QComboBox,
     QFileDialog,
     QLabel,
@@ -23,13 +22,12 @@ from handcal.calibration.sight import Observation
 from handcal.camera.feed import CameraStatus
 from handcal.core.errors import FileError
 from handcal.core.types import Float64, Frame, UInt8, UInt16
-from handcal.hand.outline import contour_px
 from handcal.hand.settings import SegmentSettings
 from handcal.io.files import write_atomic
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.theme import SPACING_PX, follow_theme, icon
 from handcal_gui.app.translation import tr
-from handcal_gui.calibrate.camera.hand_overlay import HandOverlay
+from handcal_gui.calibrate.camera.hand_overlay import overlays
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import let_keys_choose, plain_message, tool_button
 from handcal_gui.widgets.image_view import ImageView
@@ -157,7 +155,7 @@ class CameraPanel(QWidget):
 
 
 class _Pictures(QWidget):
-    """The two images, side by side or stacked, whichever makes them larger."""
+    """The two images, side by side."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -174,11 +172,7 @@ class _Pictures(QWidget):
         hbox(
             (self._depth, 1), self._legend, on=self._depth_side, margins=0, spacing=SPACING_PX // 2
         )
-        self._layout = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
-        self._layout.setContentsMargins(0, 0, 0, 0)
-        self._layout.setSpacing(SPACING_PX)
-        self._layout.addWidget(self._color, 1)
-        self._layout.addWidget(self._depth_side, 1)
+        hbox((self._color, 1), (self._depth_side, 1), on=self, margins=0, spacing=SPACING_PX)
 
     def begin(self, depth_colors: DepthColors) -> None:
         self._depth_colors = depth_colors
@@ -197,17 +191,9 @@ class _Pictures(QWidget):
         self._depth.show_image(frame.depth)
 
     def show_hand(self, frame: Frame, seen: Observation) -> None:
-        if seen.cloud is None:
-            self._color.show_overlay(None)
-            self._depth.show_overlay(None)
-            return
-        cloud = seen.cloud
-        depth_px, color_px = contour_px(cloud, frame)
-        self._depth.show_overlay(HandOverlay(cloud, depth_px, depth_px, seen.is_over_limit).draw)
-        if color_px is not None:
-            self._color.show_overlay(
-                HandOverlay(cloud, depth_px, color_px, seen.is_over_limit).draw
-            )
+        of_depth, of_color = overlays(frame, seen)
+        self._depth.show_overlay(of_depth)
+        self._color.show_overlay(of_color)
 
     def show_text(self, *, message: str, caption: str = "") -> None:
         is_in_depth = not self._color.has_image and not self._depth_side.isHidden()
@@ -216,14 +202,6 @@ class _Pictures(QWidget):
         if self._depth.has_image and not self._color.has_image:
             message = message or _NO_COLOR
         self._color.show_text(message=message, caption=caption if is_in_color else "")
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Stack the images if that makes them larger."""
-        super().resizeEvent(event)
-        width, height = 9 * self.width(), 16 * self.height()
-        is_stacked = min(width, height / 2) > min(width / 2, height)
-        directions = QBoxLayout.Direction
-        self._layout.setDirection(directions.TopToBottom if is_stacked else directions.LeftToRight)
 
 
 class _Status(QWidget):

@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -19,7 +20,7 @@ from PySide6.QtGui import (
     QPixmap,
     QWheelEvent,
 )
-from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QSizePolicy, QToolButton, QWidget
+from PySide6.QtWidgets import QCheckBox, QSizePolicy, QToolButton, QWidget
 
 from handcal.calibration.hands import PlacedHand
 from handcal.core.geometry import invert, transform
@@ -36,14 +37,14 @@ from handcal_gui.calibrate.parts.legend import RESIDUALS, LegendEntry
 from handcal_gui.calibrate.parts.missing import missing_text
 from handcal_gui.calibrate.parts.paint_turns import update_in_turn
 from handcal_gui.calibrate.parts.residual_scale import (
-    OUTLIER,
     ResidualScale,
     draw_crosses,
     residual_colors,
 )
 from handcal_gui.calibrate.parts.splat import rgb, splat
 from handcal_gui.widgets.elided_label import ElidedLabel
-from handcal_gui.widgets.layouts import vbox
+from handcal_gui.widgets.fields import with_name
+from handcal_gui.widgets.layouts import hbox, vbox
 
 NAMES = ("right", "down", "away")
 _GRID_MM = 50.0
@@ -63,19 +64,19 @@ _LABELS_EMS = (7.0, 4.5)
 _UNLABELLED_EMS = (1.0, 1.0)
 _LEAST_LABELLED_EMS = 11.0
 """Height below which the box has no labels: the hand would be too small beside them."""
-_NO_POINTS = np.empty((0, 3))
 _EMPTY = tr("The hand cloud will appear here. Hold a hand in front of the depth camera.")
 _FROM_CAMERA = tr("mm from the depth camera")
 _FROM_CURSOR = tr("mm from the centre of the cursor")
 _TURNED = tr("The live hand is rotated too far")
 _HIDDEN = tr("All points are hidden. Switch cursor or hand on below.")
 _DIRECTIONS = {
-    "front": (Direction.FRONT, tr("Front"), tr("As the wearer sees it (1)")),
-    "side": (Direction.SIDE, tr("Side"), tr("From the wearer's right (2)")),
-    "top": (Direction.TOP, tr("Top"), tr("From above (3)")),
+    "front": (Direction.FRONT, tr("Front"), "1", tr("As the wearer sees it (1)")),
+    "side": (Direction.SIDE, tr("Side"), "2", tr("From the wearer's right (2)")),
+    "top": (Direction.TOP, tr("Top"), "3", tr("From above (3)")),
     "reset": (
         Direction.ASLANT,
         tr("Reset"),
+        "R",
         tr("Oblique view of the whole scene (R, or double-click)"),
     ),
 }
@@ -110,15 +111,20 @@ class _Cloud:
     role: str
     points_mm: Float64
     residuals_m: Float64 | None = None
+    reach_m: float = 0.0
+    """End of the residuals' colour scale."""
 
-    def drawn(self) -> tuple[Float64, UInt8]:
-        """Return at most `_MOST_POINTS` points, and their colours."""
+    def drawn(self) -> tuple[Float64, UInt8, Float64]:
+        """Return at most `_MOST_POINTS` points with their colours, and points without a partner."""
         every = slice(None, None, max(1, -(-len(self.points_mm) // _MOST_POINTS)))
         points_mm = self.points_mm[every]
-        if self.residuals_m is not None:
-            return points_mm, residual_colors(self.residuals_m[every])
-        color = np.array(rgb(getattr(colors(), self.role)), np.uint8)
-        return points_mm, np.tile(color, (len(points_mm), 1))
+        if self.residuals_m is None:
+            color = np.array(rgb(getattr(colors(), self.role)), np.uint8)
+            return points_mm, np.tile(color, (len(points_mm), 1)), _NONE
+        residuals_m = self.residuals_m[every]
+        is_outlier = np.isnan(residuals_m)
+        shades = residual_colors(residuals_m[~is_outlier], self.reach_m)
+        return points_mm[~is_outlier], shades, points_mm[is_outlier]
 
 
 class CloudPanel(QWidget):
@@ -210,42 +216,37 @@ class CloudPanel(QWidget):
         else:
             self._forget_pairs()
 
-    def show_alignment(self, alignment: Alignment, residuals_m: Float64 | None = None) -> None:
+    def show_alignment(self, alignment: Alignment, residuals_m: Float64, reach_m: float) -> None:
         """Show a finished alignment, its hand coloured by (M,) residuals; NaN for outliers.
 
-        Its cursor would cover the colours, and is hidden at first.
+        The colour scale ends at `reach_m`. Its cursor would cover the colours, and is hidden at
+        first.
         """
         T_E_W = alignment.T_E_W[alignment.eyes[0]]
         middle_m = np.median(transform(T_E_W, alignment.cursor_m), axis=0)
         axes = _Axes(T_E_W, middle_m, _FROM_CURSOR)
         self._forget_pairs()
         self._pairs.setEnabled(False)
-        role = "live" if residuals_m is None else RESIDUALS
+        self._scale.show_reach(reach_m)
+        hand_mm = axes.mm(alignment.hand_m)
         self._show(
             "solved-cursor",
             axes.mm(alignment.cursor_m),
-            _Cloud("hand", tr("Hand"), role, axes.mm(alignment.hand_m), residuals_m),
+            _Cloud("hand", tr("Hand"), RESIDUALS, hand_mm, residuals_m, reach_m),
             axes.name,
         )
 
     def _lay_out(self) -> None:
-        controls, legend = QHBoxLayout(), QHBoxLayout()
-        controls.setSpacing(SPACING_PX // 2)
-        for name, (direction, text, tooltip) in _DIRECTIONS.items():
-            button = QToolButton()
-            button.setObjectName(f"cloud-{name}")
+        buttons = []
+        for name, (direction, text, _, tooltip) in _DIRECTIONS.items():
+            button = with_name(QToolButton(), f"cloud-{name}", text, tooltip)
             button.setText(text)
-            button.setToolTip(tooltip)
             button.clicked.connect(lambda _, direction=direction: self._view.look(direction))
-            controls.addWidget(button)
-        controls.addStretch()
-        controls.addWidget(self._pairs)
-        legend.setSpacing(SPACING_PX)
-        legend.addWidget(self._cursor)
-        legend.addWidget(self._hand, 1)
+            buttons.append(button)
+        controls = hbox(*buttons, 1, self._pairs, spacing=SPACING_PX // 2)
         unit = ElidedLabel()
         unit.setText(tr("points"))
-        legend.addWidget(unit)
+        legend = hbox(self._cursor, (self._hand, 1), unit, spacing=SPACING_PX)
         vbox(
             controls,
             (self._view, 1),
@@ -296,11 +297,13 @@ class CloudPanel(QWidget):
     def _draw(self) -> None:
         shown = [cloud for cloud in self._clouds if cloud.layer not in self._hidden]
         drawn = [cloud.drawn() for cloud in shown]
-        points_mm = np.concatenate([_NONE, *(points for points, _ in drawn)])
-        shades = np.concatenate([np.empty((0, 3), np.uint8), *(shades for _, shades in drawn)])
+        points_mm = np.concatenate([_NONE, *(points for points, _, _ in drawn)])
+        shades = np.concatenate([np.empty((0, 3), np.uint8), *(shades for _, shades, _ in drawn)])
+        outliers_mm = np.concatenate([_NONE, *(outliers for _, _, outliers in drawn)])
         # Without a hand, the text says why there is none.
         is_hidden = not shown and any(cloud.layer == "hand" for cloud in self._clouds)
-        self._view.show_points(points_mm, shades, _HIDDEN if is_hidden else self._text)
+        text = _HIDDEN if is_hidden else self._text
+        self._view.show_points(points_mm, shades, text, outliers_mm)
 
     def _join(self, cursor: PlacedHand, hand: PlacedHand, rotation_W: Float64, axes: _Axes) -> None:
         now_s = time.monotonic()
@@ -341,8 +344,8 @@ class CloudView(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)  # as ImageView
-        self._points_mm, self._colors = _NO_POINTS, np.empty((0, 3), np.uint8)
-        self._from_mm = self._to_mm = _NO_POINTS
+        self._points_mm, self._colors = _NONE, np.empty((0, 3), np.uint8)
+        self._outliers_mm = self._from_mm = self._to_mm = _NONE
         self._text = ""
         self._box: Box | None = None
         self._orbit = Orbit()
@@ -357,7 +360,9 @@ class CloudView(QWidget):
         """The present view of the points."""
         return self._orbit
 
-    def show_points(self, points_mm: Float64, point_colors: UInt8, text: str) -> None:
+    def show_points(
+        self, points_mm: Float64, point_colors: UInt8, text: str, outliers_mm: Float64 = _NONE
+    ) -> None:
         """Show points with a caption, or a message if there are none; outliers are crosses.
 
         Parameters
@@ -367,7 +372,9 @@ class CloudView(QWidget):
         point_colors : (N, 3) uint8
             RGB.
         text : str
+        outliers_mm : (M, 3) float64
         """
+        self._outliers_mm = outliers_mm
         self._points_mm, self._colors, self._text = points_mm, point_colors, text
         if len(points_mm):
             smallest = Box.around(points_mm)
@@ -442,12 +449,11 @@ class CloudView(QWidget):
             (tr("Rotate down"), "Down", lambda: self._turn(0.0, turn)),
             (tr("Zoom in"), "+ =", lambda: self._change(self._orbit.zoomed(zoom))),
             (tr("Zoom out"), "-", lambda: self._change(self._orbit.zoomed(1.0 / zoom))),
-            (tr("Front"), "1", lambda: self.look(Direction.FRONT)),
-            (tr("Side"), "2", lambda: self.look(Direction.SIDE)),
-            (tr("Top"), "3", lambda: self.look(Direction.TOP)),
-            (tr("Reset"), "R", lambda: self.look(Direction.ASLANT)),
         ):
             add_action(self, text, keys, do, context=Qt.ShortcutContext.WidgetShortcut)
+        for direction, text, key, _ in _DIRECTIONS.values():
+            look = partial(self.look, direction)
+            add_action(self, text, key, look, context=Qt.ShortcutContext.WidgetShortcut)
 
     def _turn(self, yaw_rad: float, pitch_rad: float) -> None:
         self._orbit = self._orbit.turned(yaw_rad, pitch_rad)
@@ -465,15 +471,11 @@ class CloudView(QWidget):
         points_px[:, :2] += np.divide(size, 2.0)
         background = rgb(colors().canvas)
         point_px = np.clip(_POINT_MM * self._orbit.px_per_mm, _LEAST_POINT_PX, _MOST_POINT_PX)
-        seen, shades = points_px, self._colors
-        # Channel by channel, a tenth of the time; a live cloud, painted for every frame, has none.
-        red, green, blue = (shades[:, i] == shade for i, shade in enumerate(rgb(OUTLIER)))
-        if (is_outlier := red & green & blue).any():
-            seen, shades = seen[~is_outlier], shades[~is_outlier]
-        image = splat(seen, shades, background, size, round(ratio * point_px))
+        image = splat(points_px, self._colors, background, size, round(ratio * point_px))
         painter.drawImage(QRectF(self.rect()), image)
-        painter.setPen(QPen(QColor(OUTLIER), 1))
-        draw_crosses(painter, points_px[is_outlier, :2] / ratio, point_px)
+        middle_px = np.array([self.width(), self.height()]) / 2.0
+        outliers_px = self._orbit.project(self._outliers_mm)[:, :2] + middle_px
+        draw_crosses(painter, outliers_px, point_px)
         painter.setPen(self.palette().windowText().color())
 
     def _paint_lines(self, painter: QPainter) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import replace
 
 from handcal.calibration.sight import Observation
@@ -17,10 +16,6 @@ _STARTING_S = 4.0
 _SLOW_HZ, _FAST_HZ = 8.0, 10.0
 """Frame rates below which, and above which again, hand and confirmation are hard to match."""
 _SLOW_S = 3.0
-_ENOUGH_HZ, _MOST_LOST = 20.0, 0.5
-"""Below this rate, frames lost in this computer are named if they are more than this share of the
-frames taken."""
-_LOST_OVER_S = 1.0
 _FEW_POSES_HZ = 5.0
 """Poses a second below which no hand can be placed in time."""
 _FEW_POSES = tr("The headset sends too few poses to place a hand; close other programs on it")
@@ -46,10 +41,8 @@ class Conditions:
         self.is_slow = False
         self._is_usb = is_usb
         self._is_virtual = is_virtual
-        self._loses = False
         self._is_camera = False  # it gives few frames, and none is lost in this computer
-        self._rate_since_s: float | None = None
-        self._dropped: deque[tuple[float, int]] = deque()
+        self._since: tuple[float, int] | None = None  # time, and frames that were dropped by then
         self._problem, self._problem_since_s = "", 0.0
         self._hand_problem, self._hand_since_s = "", 0.0
         self._seen: Observation | None = None
@@ -118,28 +111,21 @@ class Conditions:
         return is_same_state and is_new and not snapshot.camera.problem
 
     def _watch_rate(self, camera: CameraStatus, now_s: float) -> None:
-        """Note that frames are few or many are lost, or that it is over, once this has lasted."""
-        rate_hz, lost_hz = camera.rate_hz, self._lost_hz(camera, now_s)
-        is_few = rate_hz < (_FAST_HZ if self.is_slow else _SLOW_HZ)
-        loses = rate_hz < _ENOUGH_HZ and lost_hz > _MOST_LOST * rate_hz
-        if not self._has_started or rate_hz == 0.0 or (is_few or loses) == self.is_slow:
-            self._rate_since_s = None
-        elif self._rate_since_s is None:
-            self._rate_since_s = now_s
-        elif now_s - self._rate_since_s >= _SLOW_S:
-            self.is_slow, self._rate_since_s = not self.is_slow, None
-            self._loses = loses and not is_few
+        """Note that frames are few, or that it is over, once this has lasted."""
+        is_few = camera.rate_hz < (_FAST_HZ if self.is_slow else _SLOW_HZ)
+        if not self._has_started or camera.rate_hz == 0.0 or is_few == self.is_slow:
+            self._since = None
+        elif self._since is None:
+            self._since = now_s, camera.dropped
+        elif now_s - self._since[0] >= _SLOW_S:
             # Frames that the camera counted, but nobody took, are lost in this computer.
-            self._is_camera = self._is_usb and lost_hz == 0.0
+            self._is_camera = self._is_usb and camera.dropped == self._since[1]
+            self.is_slow, self._since = is_few, None
 
     def _slow_text(self, rate_hz: float) -> str:
         """Return the warning about few frames, with what it leads to; empty if there are enough."""
-        if not self.is_slow:
+        if not self.is_slow or rate_hz >= _SLOW_HZ:
             return ""
-        if rate_hz >= _SLOW_HZ and not self._loses:
-            return ""  # it is getting better
-        if self._loses:
-            return tr("fewer than two thirds of the camera's frames are used; close other programs")
         advice = tr("close other programs")
         if self._is_camera:
             advice = tr("plug the camera into a USB 3 port")
@@ -147,11 +133,3 @@ class Conditions:
             "images per second: {:.0f}, fewer than {:.0f}; {}, or confirmations may be refused"
         )
         return text.format(rate_hz, _SLOW_HZ, advice)
-
-    def _lost_hz(self, camera: CameraStatus, now_s: float) -> float:
-        """Return the frames per second that were lost recently."""
-        self._dropped.append((now_s, camera.dropped))
-        while len(self._dropped) > 2 and now_s - self._dropped[1][0] >= _LOST_OVER_S:
-            self._dropped.popleft()
-        since_s, before = self._dropped[0]
-        return (camera.dropped - before) / max(now_s - since_s, _LOST_OVER_S)

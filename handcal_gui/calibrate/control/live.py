@@ -18,6 +18,7 @@ from handcal.calibration.procedure import Calibration
 from handcal.calibration.states import ProcedureError, State
 from handcal.camera.clock import INFORM_NS
 from handcal.core.errors import FileError
+from handcal.core.types import EyePlan
 from handcal.link.server import HeadsetServer
 from handcal.register.results import SolveSettings
 from handcal.session.session import Session
@@ -85,7 +86,7 @@ class CalibrationController(QObject):
         self._is_watching = self._is_plan_held = False
         self._conditions = Conditions()
         panels = window.panels
-        self._turns: deque[Panel] = deque((panels.cloud, panels.wearer_view, wizard_panel.picture))
+        self._turns: deque[Panel] = deque((*panels.shown("in turn"), wizard_panel.picture))
         # Numbers of commands: the wizard's last one, and those in the snapshot shown.
         self._doing = self._shown = 0
         self._failed_command = self._failure = self._notes_problem = ""
@@ -177,6 +178,10 @@ class CalibrationController(QObject):
             if command is not None:
                 self._doing = self._submit(action.value, command)
 
+    def choose_eyes(self, eyes: EyePlan) -> None:
+        """Have the plan align other eyes, or in another order."""
+        self._submit(_CHOOSING, lambda station: station.plan.choose(eyes))
+
     def _nudge(self, right_arcmin: float, down_arcmin: float, size: float) -> None:
         """Move the drawing of the eye that is verified."""
         verifying = self._snapshot.procedure.verifying if self._snapshot is not None else None
@@ -194,12 +199,9 @@ class CalibrationController(QObject):
 
     def _connect(self) -> None:
         panels = self._window.panels
-        self._wizard_panel.asked.connect(self.do)
-        self._wizard_panel.nudged.connect(self._nudge)
-        self._wizard_panel.went_back.connect(self._go_back)
-        self._wizard_panel.eyes_chosen.connect(
-            lambda eyes: self._submit(_CHOOSING, lambda station: station.plan.choose(eyes))
-        )
+        self._wizard_panel.bar.do = self.do
+        self._wizard_panel.nudge = self._nudge
+        self._wizard_panel.go_back = self._go_back
         self._wizard_panel.step_changed.connect(self._on_step)
         comparing = self._wizard_panel.comparison, panels.trials.comparison
         for asking in (panels.fine_tune, panels.trials, panels.session, *comparing):
@@ -231,8 +233,7 @@ class CalibrationController(QObject):
             self._window.show_wearer(snapshot.record.wearer)
         self._snapshot = snapshot
         panels = self._window.panels
-        # Even while hidden: they may be used before the next snapshot, or have a history.
-        always: set[object] = {panels.fine_tune, panels.trials, panels.link}
+        always: set[object] = {*panels.shown("always")}
         # The guide and the rotation panel advise the same: they never show different frames.
         always |= {panels.rotation} if panels.rotation.isVisible() else set()
         # Panels that are slow to paint take turns, so that the window never waits for all of them.

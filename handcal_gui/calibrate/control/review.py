@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QProgressDialog
 from handcal.calibration.solve_again import solve_sound, stored_solve_settings
 from handcal.core.progress import Progress
 from handcal.core.types import Eye
-from handcal.register.results import Results, SolveSettings
+from handcal.register.results import Results, SolveSettings, residuals_reach_m
 from handcal.session.record import replay
 from handcal.session.session import Session, SessionRecord
 from handcal_gui.app.translation import tr
@@ -152,7 +152,8 @@ class ReviewController(QObject):
         if self.record is not None and self._results is not None:
             residuals_m = self._results.alignments[number][eye].residuals_m
             cloud = self._window.panels.cloud
-            cloud.show_alignment(self.record.alignments[number], residuals_m)
+            reach_m = residuals_reach_m(self._results)
+            cloud.show_alignment(self.record.alignments[number], residuals_m, reach_m)
 
 
 def _without_alignments(record: SessionRecord) -> str:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
-from enum import Enum
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
-from PySide6.QtCore import QObject, QSignalBlocker, Qt, QTimer, Signal
+from PySide6.QtCore import QObject, QSignalBlocker, Qt, QTimer
 from PySide6.QtGui import (
     QAction,
     QActionGroup,
@@ -46,6 +45,8 @@ from handcal_gui.widgets.result_rows import EYE_NAMES
 
 Shifts: TypeAlias = Mapping[Eye, Float64]
 """φ of each eye, (3,) float64, metres."""
+Arrival: TypeAlias = Literal["sending", "arrived", "late"]
+"""The state of the last φ sent to the headset."""
 PERIOD_MS = 33
 SETTLE_MS = 700
 _LATE_NS = 2_000_000_000
@@ -79,7 +80,7 @@ _DIRECTIONS = (
     tr("below the rig's viewpoint (φ2); negative is above"),
     tr("in front of the rig's viewpoint, towards the display (φ3); negative is behind"),
 )
-_ARRIVALS = {
+_ARRIVALS: dict[Arrival, tuple[str, str]] = {
     "sending": ("wait", tr("Sending to the headset…")),
     "arrived": ("check", tr("In the headset.")),
     "late": ("warning", tr("Not acknowledged by the headset; see Link")),
@@ -127,11 +128,7 @@ class FineTunePanel(QWidget):
         self._history.indexChanged.connect(self._refresh)
         self._burst = 0  # changes of one burst are undone together
         self._burst_of: tuple[tuple[Eye, ...], int] | None = None
-        self._stream = ShiftStream(self)
-        self._stream.sent.connect(
-            lambda shifts_m: self.submit(tr("set φ"), calibrating(lambda c: c.set_shift(shifts_m)))
-        )
-        self._stream.settled.connect(self._record)
+        self._stream = ShiftStream(self._send, self._record, self)
         self._make_actions()
         self._lay_out()
         follow_theme(self, self._draw_icons)
@@ -191,7 +188,7 @@ class FineTunePanel(QWidget):
         if is_new or obstacle != self._obstacle or not is_same:
             self._obstacle, self._solved, self._calibrated = obstacle, solved, calibrated
             self._refresh()
-        sign, text = ("wait", obstacle) if obstacle else _ARRIVALS[self._stream.arrival.value]
+        sign, text = ("wait", obstacle) if obstacle else _ARRIVALS[self._stream.arrival]
         if snapshot.trial_eye is not None and not obstacle:
             text = f"{text} {_FOR_TRIAL}"
         self._show_status(sign, text)
@@ -246,6 +243,9 @@ class FineTunePanel(QWidget):
             self._burst_of = None
         if not is_same_shifts(shifts_m, self._present):
             self._history.push(_Change(self, self._present, shifts_m, burst))
+
+    def _send(self, shifts_m: Shifts) -> None:
+        self.submit(tr("set φ"), calibrating(lambda c: c.set_shift(shifts_m)))
 
     def _record(self) -> None:
         self._burst_of = None
@@ -433,12 +433,9 @@ class _Slider(QSlider):
 class _EyeEditor(QWidget):
     """φ of one eye in fields and sliders, with its effect on the drawn target."""
 
-    edited = Signal(int, float)
-
-    def __init__(self, eye: Eye, edit: object) -> None:
+    def __init__(self, eye: Eye, edit: Callable[[int, float], object]) -> None:
         super().__init__()
         self.setObjectName(f"{eye}Editor")
-        self.edited.connect(edit)
         title = EYE_NAMES[eye]
         self.chosen = QRadioButton(title)
         self.chosen.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # or it would take the arrow keys
@@ -455,7 +452,7 @@ class _EyeEditor(QWidget):
             field.setAccessibleName(tr("{} φ{} in millimetres").format(title, axis + 1))
             field.setFont(number_font())
             field.setKeyboardTracking(False)
-            field.valueChanged.connect(lambda mm, axis=axis: self.edited.emit(axis, 1e-3 * mm))
+            field.valueChanged.connect(lambda mm, axis=axis: edit(axis, 1e-3 * mm))
             slider = _Slider(Qt.Orientation.Horizontal)
             slider.setObjectName(f"slider{axis + 1}")
             slider.setAccessibleName(f"{title} φ{axis + 1}")
@@ -463,7 +460,7 @@ class _EyeEditor(QWidget):
             slider.setRange(-reach, reach)
             slider.setMinimumWidth(3 * SPACING_PX)
             slider.valueChanged.connect(
-                lambda steps, axis=axis: self.edited.emit(axis, 1e-3 * steps / _SLIDER_STEPS_PER_MM)
+                lambda steps, axis=axis: edit(axis, 1e-3 * steps / _SLIDER_STEPS_PER_MM)
             )
             grid.addWidget(QLabel(f"φ{axis + 1}"), axis, 0)
             grid.addWidget(field, axis, 1)
@@ -514,43 +511,41 @@ def _row(*items: QWidget | QAction | None) -> QHBoxLayout:
     return hbox(*made, spacing=SPACING_PX // 2)
 
 
-class Arrival(Enum):
-    """The state of the last φ sent to the headset."""
-
-    SENDING = "sending"
-    ARRIVED = "arrived"
-    LATE = "late"
-
-
 class ShiftStream(QObject):
     """Sends the newest shifts, and distinguishes them from shifts sent by others.
 
+    Parameters
+    ----------
+    send : callable
+        Has shifts rendered; called at most 30 times a second.
+    store : callable
+        Stores the last shifts sent; called when they are unchanged for 0.7 s.
+
     Attributes
     ----------
-    sent : Signal(object)
-        Shifts to render with; at most 30 times a second.
-    settled : Signal()
-        The last shifts sent should be stored: unchanged for 0.7 s.
     arrival : Arrival
         As of the last snapshot seen.
     """
 
-    sent = Signal(object)
-    settled = Signal()
-
-    def __init__(self, parent: QObject | None = None) -> None:
+    def __init__(
+        self,
+        send: Callable[[Shifts], object],
+        store: Callable[[], object],
+        parent: QObject | None = None,
+    ) -> None:
         super().__init__(parent)
-        self._pace = _timer(self, PERIOD_MS)
+        self._give, self._store = send, store
+        self._pace = QTimer(self, interval=PERIOD_MS, singleShot=True)
         self._pace.timeout.connect(self._send)
-        self._calm = _timer(self, SETTLE_MS)
-        self._calm.timeout.connect(self.settled)
+        self._calm = QTimer(self, interval=SETTLE_MS, singleShot=True)
+        self._calm.timeout.connect(store)
         self.begin()
 
     def begin(self) -> None:
         """Begin with another session: its shifts were sent by others, also if they are the same."""
         self._pace.stop()
         self._calm.stop()
-        self.arrival = Arrival.SENDING
+        self.arrival: Arrival = "sending"
         self._newest: Shifts = {}
         self._sent_ns = 0
         self._seen_since = 1  # nothing was sent that the first snapshot may not show yet
@@ -573,7 +568,7 @@ class ShiftStream(QObject):
             self._send()
         if self._calm.isActive():
             self._calm.stop()
-            self.settled.emit()
+            self._store()
 
     def see(self, snapshot: Snapshot) -> bool:
         """Process the headset's present shifts; return whether they were sent by others."""
@@ -582,10 +577,10 @@ class ShiftStream(QObject):
         # The engine may have been processing the first of them when this was requested.
         is_answered = not self._pace.isActive() and self._seen_since > 1
         if is_answered and procedure.is_applied:
-            self.arrival = Arrival.ARRIVED
+            self.arrival = "arrived"
         else:
             is_late = snapshot.t_host_ns - self._sent_ns > _LATE_NS
-            self.arrival = Arrival.LATE if is_late else Arrival.SENDING
+            self.arrival = "late" if is_late else "sending"
         if not is_answered or is_same_shifts(self._newest, procedure.applied_shift_m):
             return False
         self._newest = procedure.applied_shift_m
@@ -594,19 +589,12 @@ class ShiftStream(QObject):
 
     def _send(self) -> None:
         self._sent_ns, self._seen_since = time.monotonic_ns(), 0
-        self.sent.emit(self._newest)
+        self._give(self._newest)
 
 
 def is_same_shifts(one: Shifts, other: Shifts) -> bool:
     """Return whether both hold the same eyes with the same φ."""
     return set(one) == set(other) and all(np.array_equal(one[eye], other[eye]) for eye in one)
-
-
-def _timer(parent: QObject, interval_ms: int) -> QTimer:
-    timer = QTimer(parent)
-    timer.setSingleShot(True)
-    timer.setInterval(interval_ms)
-    return timer
 
 
 def find_obstacle(snapshot: Snapshot) -> str:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, Qt, QTimer, Signal
-from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent, QPalette
+from collections.abc import Callable
+
+from PySide6.QtCore import QEvent, Qt, QTimer
+from PySide6.QtGui import QKeyEvent, QPalette
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
     QApplication,
@@ -12,15 +14,14 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QPlainTextEdit,
     QPushButton,
-    QStatusBar,
     QTextEdit,
     QWidget,
 )
 
 from handcal_gui.app.keys import add_action, native
-from handcal_gui.app.theme import SPACING_PX, colors, follow_theme
+from handcal_gui.app.theme import SPACING_PX, follow_theme
 from handcal_gui.app.translation import tr
-from handcal_gui.calibrate.guide.view import MOST_OTHERS, ButtonSpec, WizardView
+from handcal_gui.calibrate.guide.view import MOST_OTHERS, Action, ButtonSpec, WizardView
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import main_button, with_name
 from handcal_gui.widgets.key_cap import KeyCap
@@ -44,15 +45,14 @@ class ActionBar(QWidget):
 
     Attributes
     ----------
-    asked : Signal(Action)
-        A button was pressed.
+    do : callable
+        Carries out the action of a button that was pressed.
     """
-
-    asked = Signal(object)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("actionBar")
+        self.do: Callable[[Action], object] = lambda _action: None
         self._view: WizardView | None = None
         self._is_repeat = False
         self._released = (0, 0)  # key, and time in ms
@@ -169,7 +169,7 @@ class ActionBar(QWidget):
 
     def _ask(self, spec: ButtonSpec | None) -> None:
         if spec is not None and spec.is_enabled:
-            self.asked.emit(spec.action)
+            self.do(spec.action)
 
     def _show_key(self, _old: QWidget | None, new: QWidget | None) -> None:
         self._key.show_key(_TEXT_KEY if _takes_text(new) else _KEY)
@@ -177,23 +177,6 @@ class ActionBar(QWidget):
     def _color_main(self) -> None:
         # Without a palette of its own, the button has the accent colour of its class.
         self._main.setPalette(QApplication.palette() if self._why_quiet.text() else QPalette())
-
-
-class BottomStrip(QStatusBar):
-    """The window's bottom strip, below all docks; holds a bar and nothing else."""
-
-    def __init__(self, bar: QWidget) -> None:
-        super().__init__()
-        self.setSizeGripEnabled(False)  # it appears and disappears, and moves the bar
-        self.setContentsMargins(0, 0, 0, 0)
-        self.addPermanentWidget(bar, 1)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        """Draw a line above the bar."""
-        painter = QPainter(self)
-        painter.setPen(QColor(colors().muted))
-        painter.drawLine(0, 0, self.width(), 0)
-        painter.end()
 
 
 def _takes_text(widget: QWidget | None) -> bool:

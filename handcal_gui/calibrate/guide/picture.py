@@ -10,7 +10,6 @@ from PySide6.QtGui import QPagedPaintDevice, QTextDocument
 from PySide6.QtWidgets import QLabel, QStackedLayout, QWidget
 
 from handcal.core.types import EYES, Eye, Frame
-from handcal.hand.outline import contour_px
 from handcal.register.results import Results
 from handcal.register.verdict import VerdictSettings
 from handcal.session.session import SessionRecord
@@ -18,7 +17,7 @@ from handcal.station.snapshot import Snapshot
 from handcal_gui.app.keys import add_action
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
-from handcal_gui.calibrate.camera.hand_overlay import HandOverlay
+from handcal_gui.calibrate.camera.hand_overlay import overlays
 from handcal_gui.calibrate.guide.view import Step
 from handcal_gui.calibrate.parts.missing import missing_view_text
 from handcal_gui.calibrate.parts.result_card import ResultCard, result_text
@@ -115,13 +114,7 @@ class GuidePicture(QWidget):
             self._frame = frame
             self._camera.show_image(frame.color)
         if frame is not None and seen is not None:
-            outline = None
-            if seen.cloud is not None:
-                depth_px, color_px = contour_px(seen.cloud, frame)
-                if color_px is not None:
-                    overlay = HandOverlay(seen.cloud, depth_px, color_px, seen.is_over_limit)
-                    outline = overlay.draw
-            self._camera.show_overlay(outline)
+            self._camera.show_overlay(overlays(frame, seen)[1])
         message = "" if frame is not None else tr("The camera's image will appear here.")
         has_ended = frame is not None and snapshot.camera.problem
         self._camera.show_text(message=tr("No image") if has_ended else message)
@@ -136,9 +129,6 @@ class GuidePicture(QWidget):
             when = (tr(", before the calibration") if self._is_before else tr(", now")) * is_result
             origin = origin_text(view, is_solved=is_solved)
             self._titles[eye].setText(f"{EYE_NAMES[eye]}{origin}{when}")
-        has_image = any(view.image is not None for view in snapshot.views.values())
-        for entry in self._legend.values():
-            entry.show_on_image(has_image)
         has_cursor = any(len(view.cursor_px) for view in snapshot.views.values())
         self._legend["cursor"].setVisible(has_cursor or snapshot.procedure.cursor is not None)
         show_alike([self._eyes[eye] for eye in eyes])
@@ -188,7 +178,7 @@ class ResultBar(QWidget):
         copy = add_action(self, tr("Cop&y"), "", self.copy, tooltip=tr("Copy the result as text"))
         window = Qt.ShortcutContext.WindowShortcut
         ask = add_action(self, tr("Print the result"), "Ctrl+P", self._ask_printer, context=window)
-        ask.setIconText(tr("Print… (Ctrl+P)"))
+        ask.setIconText(tr("Print…"))
         self._blink_button, *others = map(tool_button, (self.blink, copy, ask))
         self.buttons = QWidget()
         hbox(self._blink_button, *others, on=self.buttons, margins=0, spacing=SPACING_PX)

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import zip_longest
+from typing import Literal
 
-from PySide6.QtCore import QRectF, QSignalBlocker, Qt, Signal, SignalInstance
-from PySide6.QtGui import QAction, QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QShortcut
-from PySide6.QtWidgets import QApplication, QComboBox, QHBoxLayout, QLabel, QSizePolicy, QWidget
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QAction, QShortcut
+from PySide6.QtWidgets import (
+    QApplication,
+    QComboBox,
+    QHBoxLayout,
+    QLabel,
+    QProgressBar,
+    QSizePolicy,
+    QWidget,
+)
 
 from handcal.calibration.plan import PlanSettings
 from handcal.calibration.states import State
@@ -31,7 +40,7 @@ from handcal_gui.calibrate.guide.view import (
 )
 from handcal_gui.calibrate.trials.comparison_row import ComparisonRow
 from handcal_gui.widgets.brief import show_briefly
-from handcal_gui.widgets.fields import tool_button
+from handcal_gui.widgets.fields import tool_button, with_name
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.result_rows import VERDICT_COLORS, VERDICT_ICONS
 from handcal_gui.widgets.sentence import sentence
@@ -50,11 +59,9 @@ _COMPARING = {
 }
 """Beside the panels, and in the station, which shows no trials."""
 _NO_TRIALS = tr("Trials are recorded once φ is solved, beside the panels: press F11, then T.")
-_RING_PX = 9 * SPACING_PX, 16 * SPACING_PX
+_PROGRESS_PX = 16 * SPACING_PX
 _SENTENCE_SCALE, _ROW_SCALE = (1.2, 1.8), (1.0, 1.2)
-"""Size of the ring and scales of texts: beside panels, and in the whole window."""
-_RING_STEPS = 60
-"""The ring is painted again only if it has grown by one of so many parts."""
+"""Scales of texts: beside panels, and in the whole window."""
 _ARCMIN, _FAR_ARCMIN, _GROWTH = 1.0, 5.0, 0.002
 _NUDGES: dict[tuple[str, str], tuple[float, float, float]] = {
     (tr("Move the outline left"), "Left"): (-_ARCMIN, 0.0, 0.0),
@@ -69,7 +76,7 @@ _NUDGES: dict[tuple[str, str], tuple[float, float, float]] = {
     (tr("Make the outline smaller"), "-"): (0.0, 0.0, -_GROWTH),
 }
 """Name and keys of each nudge; its movement right and down in arcminutes, and its growth."""
-_GO_BACK = {
+_GO_BACK: dict[Literal["former", "offline"], tuple[str, str]] = {
     "former": (tr("Draw with the previous φ, or with the newest again"), "G"),
     "offline": (tr("Draw with the offline calibration"), "Shift+G"),
 }
@@ -77,7 +84,7 @@ _GO_BACK = {
 
 
 class WizardPanel(QWidget):
-    """Shows a `Wizard` and emits the actions of its buttons.
+    """Shows a `Wizard`; who drives the engine sets what its buttons and keys do.
 
     Attributes
     ----------
@@ -89,42 +96,42 @@ class WizardPanel(QWidget):
     picture : GuidePicture
     comparison : ComparisonRow
         Shown in the station while the wearer compares.
-    eyes_chosen : Signal(str)
-        A person has chosen the eyes of the paper's plan: an `EyePlan`.
-    hold_changed : Signal(bool)
-        A person has chosen whether every step waits for a person.
-    nudged : Signal(float, float, float)
-        The outline of a verification should move to the right and down, in arcminutes, and to grow
+    choose_eyes : callable
+        Given the eyes of the paper's plan that a person has chosen.
+    remember_hold : callable
+        Given whether a person wants every step to wait.
+    nudge : callable
+        Moves the outline of a verification to the right and down, in arcminutes, and has it grow
         by a share.
-    went_back : Signal(str)
-        The headset should draw with the φ before the newest, ``"former"``, or with the offline
+    go_back : callable
+        Has the headset draw with the φ before the newest, ``"former"``, or with the offline
         calibration, ``"offline"``.
     step_changed : Signal(Step)
         Another step is shown.
     """
 
     step_changed = Signal(object)
-    eyes_chosen = Signal(str)
-    hold_changed = Signal(bool)
-    nudged = Signal(float, float, float)
-    went_back = Signal(str)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("wizard")
+        self.choose_eyes: Callable[[EyePlan], object] = lambda _eyes: None
+        self.remember_hold: Callable[[bool], object] = lambda _is_held: None
+        self.nudge: Callable[[float, float, float], object] = lambda *_: None
+        self.go_back: Callable[[Literal["former", "offline"]], object] = lambda _to: None
         self.wizard = Wizard()
         self.shown: WizardView | None = None
         self.picture = GuidePicture()
         self.comparison = ComparisonRow()
         self.comparison.hide()
         self._is_station = False
-        self._ring = ProgressRing("wizardRing")
+        self._progress = with_name(QProgressBar(), "wizardProgress", tr("Progress"))
         self._hold = self._hold_action()
         self._no_trials = QShortcut("T", self, lambda: show_briefly(self, _NO_TRIALS))
         self._no_trials.setEnabled(False)  # or it would take the key from the trials
         self._nudges = self._nudge_actions()
         self._undo = add_action(
-            self, tr("Movement of the outline"), "", lambda: self.asked.emit(Action.UNDO_NUDGE)
+            self, tr("Movement of the outline"), "", lambda: self.bar.do(Action.UNDO_NUDGE)
         )
         self._undo.setObjectName("undo")
         self._undo.setEnabled(False)
@@ -142,15 +149,8 @@ class WizardPanel(QWidget):
         self._plan = QComboBox()
         self._plan.setObjectName("wizardPlan")
         self._lay_out()
-        self._plan.currentIndexChanged.connect(
-            lambda index: self.eyes_chosen.emit(list(_ORDERS)[index])
-        )
+        self._plan.currentIndexChanged.connect(lambda index: self.choose_eyes(list(_ORDERS)[index]))
         follow_theme(self, self._refresh)
-
-    @property
-    def asked(self) -> SignalInstance:
-        """The signal of the bar: an `Action` was asked for."""
-        return self.bar.asked
 
     def start(self, wizard: Wizard, *, is_held: bool = True) -> None:
         """Switch to another wizard; if it is held, every step waits for a person."""
@@ -179,7 +179,10 @@ class WizardPanel(QWidget):
                 self.step_changed.emit(view.step)
             if before is None or before.sentence != view.sentence:
                 self.picture.show_snapshot(snapshot)  # before its turn, or it contradicts the text
-        self._ring.show_count(*_count(snapshot, view))
+        done, planned, unit = _count(snapshot, view)
+        self._progress.setRange(0, planned)
+        self._progress.setValue(done)
+        self._progress.setFormat(f"{done}/{planned} {unit}")
 
     def hold(self, is_held: bool) -> None:
         """Let every step wait for a person, or let steps run automatically."""
@@ -193,13 +196,15 @@ class WizardPanel(QWidget):
         self._no_trials.setEnabled(is_station)
         for texts, scales in (
             ([self._sentence], _SENTENCE_SCALE),
-            ([self._preconditions, self._fact, self._note, self.comparison], _ROW_SCALE),
+            (
+                [self._preconditions, self._fact, self._note, self.comparison, self._progress],
+                _ROW_SCALE,
+            ),
         ):
             font = self.font()
             font.setPointSizeF(scales[is_station] * font.pointSizeF())
             for text in texts:
                 text.setFont(font)
-        self._ring.setFixedSize(_RING_PX[is_station], _RING_PX[is_station])
 
     def add_switch(self, station: QAction) -> None:
         """Offer to show only the guide, beside what holds the steps."""
@@ -227,11 +232,14 @@ class WizardPanel(QWidget):
         """Return the actions that move the outline of a verification the way that keys point."""
         actions = []
         for (name, keys), nudge in _NUDGES.items():
-            action = add_action(self, name, keys, partial(self.nudged.emit, *nudge))
+            action = add_action(self, name, keys, partial(self._move, nudge))
             action.setShortcutContext(Qt.ShortcutContext.WindowShortcut)
             action.setEnabled(False)
             actions.append(action)
         return actions
+
+    def _move(self, nudge: tuple[float, float, float]) -> None:
+        self.nudge(*nudge)
 
     def _go_back_actions(self) -> list[QAction]:
         """Return the actions that have the headset draw with another φ; the guide is then held."""
@@ -243,13 +251,13 @@ class WizardPanel(QWidget):
             actions.append(action)
         return actions
 
-    def _ask_to_go_back(self, to: str) -> None:
+    def _ask_to_go_back(self, to: Literal["former", "offline"]) -> None:
         self.hold(True)  # or a plan would continue, and send another φ
-        self.went_back.emit(to)
+        self.go_back(to)
 
     def _choose_hold(self, is_held: bool) -> None:
         self.hold(is_held)
-        self.hold_changed.emit(is_held)
+        self.remember_hold(is_held)
 
     def _lay_out(self) -> None:
         scale_font(self._title, 1.6, is_bold=True)
@@ -274,11 +282,12 @@ class WizardPanel(QWidget):
         self._head = hbox(self._title, 0, self._choice, self.picture.result.buttons, hold)
         layout = vbox(self._rail, on=self, margins=2 * SPACING_PX, spacing=SPACING_PX)
         layout.addLayout(self._head)
-        self._ring.setToolTip(tr("Alignments made, or eyes verified"))
+        self._progress.setToolTip(tr("Alignments made, or eyes verified"))
+        self._progress.setFixedWidth(_PROGRESS_PX)
         said = self._sentence, self._preconditions, self._fact, self._note
         texts = vbox(*said, 0, spacing=SPACING_PX // 2)
-        ring = vbox(self._ring, 0)
-        layout.addLayout(hbox((texts, 1), ring, spacing=2 * SPACING_PX))
+        progress = vbox(self._progress, 0)
+        layout.addLayout(hbox((texts, 1), progress, spacing=2 * SPACING_PX))
         layout.addWidget(self.comparison)
         layout.addWidget(self.picture, 1)
         self.use_whole_window(False)
@@ -424,60 +433,3 @@ class _Row(QWidget):
         self._icon.setPixmap(icon(name, shade).pixmap(2 * SPACING_PX))
         self._icon.setAccessibleName(word)
         self._text.setText(shown.text)
-
-
-class ProgressRing(QWidget):
-    """Shows a count with its name, and fills with it."""
-
-    def __init__(self, name: str, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.setObjectName(name)
-        self.setAccessibleName(tr("Progress"))
-        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self._text = self._unit = ""
-        self._part = 0
-
-    @property
-    def text(self) -> str:
-        """The upper text inside."""
-        return self._text
-
-    def show_count(self, done: int, planned: int, unit: str) -> None:
-        """Show a count."""
-        text = f"{done}/{planned}"
-        part = round(_RING_STEPS * done / planned)
-        shown = part, text, unit
-        if shown != (self._part, self._text, self._unit):
-            self._part, self._text, self._unit = shown
-            self.setAccessibleDescription(f"{text} {unit}")
-            self.update()
-
-    def paintEvent(self, _: QPaintEvent) -> None:
-        """Draw the ring, what has filled of it from the top, and the text."""
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        width = self.width() / 11
-        ring = QRectF(self.rect()).adjusted(width, width, -width, -width)
-        faint = QColor(colors().muted)
-        faint.setAlphaF(0.3)
-        painter.setPen(QPen(faint, width))
-        painter.drawEllipse(ring)
-        pen = QPen(QColor(colors().good), width)
-        pen.setCapStyle(Qt.PenCapStyle.FlatCap)
-        painter.setPen(pen)
-        painter.drawArc(ring, 90 * 16, -round(360 * 16 * self._part / _RING_STEPS))
-        painter.setPen(self.palette().windowText().color())
-        upper = ring.adjusted(0, 0, 0, -ring.height() / 4 if self._unit else 0)
-        self._write(painter, upper, self._text, self.width() // 4)
-        lower = ring.adjusted(1.8 * width, ring.height() / 2.1, -1.8 * width, -ring.height() / 6)
-        self._write(painter, lower, self._unit, self.width() // 6)
-
-    def _write(self, painter: QPainter, place: QRectF, text: str, height_px: int) -> None:
-        """Write a text in the middle of a place, smaller if it would not fit."""
-        font = self.font()
-        font.setPixelSize(height_px)
-        width_px = QFontMetricsF(font).horizontalAdvance(text)
-        if width_px > place.width():
-            font.setPixelSize(int(height_px * place.width() / width_px))
-        painter.setFont(font)
-        painter.drawText(place, Qt.AlignmentFlag.AlignCenter, text)

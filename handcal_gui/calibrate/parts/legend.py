@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from functools import lru_cache
-
-from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen
+from PySide6.QtCore import QLineF, QRectF, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QCheckBox, QLabel, QSizePolicy, QWidget
 
 from handcal_gui.app.theme import SPACING_PX, colors
@@ -18,50 +15,12 @@ RESIDUALS = "residuals"
 """The role of points that are coloured by their residuals."""
 _LINE_PX, _POINTS_PX = (22, 14), (14, 14)
 """Sizes of samples."""
-HALO_PX = 2.0
-"""Added to the width of a line for that of its ground over an image."""
-DOTS_APART = 7 / 3
-"""Distance from dot to dot, in widths of the line: their halos do not touch."""
-_ON_IMAGE = "#87918c"
-"""Ground of samples of what is drawn over an image: no world is lighter or darker on average."""
 
 
 def role_color(role: str, widget: QWidget) -> QColor:
     """Return a colour by its meaning: a field of `Colors`, or ``"text"``, the widget's own."""
     text = widget.palette().windowText().color()
     return text if role == "text" else QColor(getattr(colors(), role))
-
-
-def draw_dots(
-    painter: QPainter,
-    places: Iterable[tuple[int, int]],
-    color: QColor,
-    width_px: float,
-    halo: str = "",
-) -> None:
-    """Draw dots as wide as a line around pixels of a widget, optionally with halos of a colour."""
-    dot = _dot(color.name(), width_px, halo, painter.device().devicePixelRatio())
-    corner_px = int(width_px + HALO_PX) // 2
-    for x, y in places:
-        painter.drawImage(x - corner_px, y - corner_px, dot)  # faster than with a QPoint
-
-
-@lru_cache(maxsize=32)
-def _dot(color: str, width_px: float, halo: str, ratio: float) -> QImage:
-    """Return a dot, which Qt copies several times faster than it draws one."""
-    side_px = int(width_px + HALO_PX)
-    dot = QImage(*2 * (round(ratio * side_px),), QImage.Format.Format_ARGB32_Premultiplied)
-    dot.setDevicePixelRatio(ratio)
-    dot.fill(Qt.GlobalColor.transparent)
-    painter = QPainter(dot)
-    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    painter.setPen(Qt.PenStyle.NoPen)
-    for shade, across_px in ((halo, side_px), (color, width_px)):
-        if shade:
-            painter.setBrush(QColor(shade))
-            painter.drawEllipse(QPointF(side_px / 2, side_px / 2), across_px / 2, across_px / 2)
-    painter.end()
-    return dot
 
 
 class LegendEntry(QWidget):
@@ -112,10 +71,6 @@ class LegendEntry(QWidget):
         self._name.setText(name)
         self._sample.show_role(role)
 
-    def show_on_image(self, is_on_image: bool) -> None:
-        """Show a line as it is drawn over an image, or on its own."""
-        self._sample.show_on_image(is_on_image)
-
     def show_number(self, number: str) -> None:
         """Show a number with its unit."""
         self._number.setText(number)
@@ -128,17 +83,11 @@ class _Sample(QWidget):
         super().__init__()
         self._role = role
         self._line = line
-        self._is_on_image = False
         self.setFixedSize(*(_POINTS_PX if line is None else _LINE_PX))
 
     def show_role(self, role: str) -> None:
         if role != self._role:
             self._role = role
-            self.update()
-
-    def show_on_image(self, is_on_image: bool) -> None:
-        if is_on_image != self._is_on_image:
-            self._is_on_image = is_on_image
             self.update()
 
     def paintEvent(self, _: QPaintEvent) -> None:
@@ -151,21 +100,7 @@ class _Sample(QWidget):
             painter.fillRect(self.rect(), color)
             return
         width_px, style = self._line
-        halo = colors().canvas if self._is_on_image else ""
-        if halo:
-            painter.fillRect(self.rect(), QColor(_ON_IMAGE))
-        middle = self.height() // 2
-        if style is Qt.PenStyle.DotLine:
-            apart_px = round(DOTS_APART * width_px)
-            xs = range(apart_px // 2, self.width(), apart_px)
-            draw_dots(painter, ((x, middle) for x in xs), color, width_px, halo)
-            return
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        across = middle + 0.5 * (round(width_px) % 2)  # or its edges are blurred
-        line = QLineF(0, across, self.width(), across)
-        flat = Qt.PenCapStyle.FlatCap
-        if halo:
-            painter.setPen(QPen(QColor(halo), width_px + HALO_PX, Qt.PenStyle.SolidLine, flat))
-            painter.drawLine(line)
-        painter.setPen(QPen(color, width_px, style, flat))
-        painter.drawLine(line)
+        across = self.height() // 2 + 0.5 * (round(width_px) % 2)  # or its edges are blurred
+        painter.setPen(QPen(color, width_px, style, Qt.PenCapStyle.FlatCap))
+        painter.drawLine(QLineF(0, across, self.width(), across))

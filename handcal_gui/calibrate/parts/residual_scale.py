@@ -4,39 +4,33 @@ from __future__ import annotations
 
 import numpy as np
 from PySide6.QtCore import QLineF, QRectF, Qt
-from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from handcal.core.types import Float64, UInt8
-from handcal.register.verdict import RMS_MAX_M
-from handcal_gui.app.theme import SPACING_PX, is_dark
+from handcal_gui.app.theme import SPACING_PX, colors, is_dark
 from handcal_gui.app.translation import tr
 from handcal_gui.calibrate.parts.splat import rgb
 
-LARGEST_MM = 1e3 * RMS_MAX_M
-"""End of the colour scale: the RMS that the verdict rejects. Fixed, so that views compare."""
 _VIRIDIS = (
     *("#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58", "#b5de2b"),
     "#fde725",
 )
 """Matplotlib's map without its darkest colour."""
-OUTLIER = "#ff00ff"
-"""Points without a partner. Of no theme, as colour-blind people must tell it from the whole map."""
 _BAR_PX = 12
 
 
 def residual_ramp() -> UInt8:
-    """Return (N, 3) RGB from 0 to `LARGEST_MM`, in increasing contrast with the canvas."""
+    """Return (N, 3) RGB from 0 to the end of the scale, in increasing contrast with the canvas."""
     ramp = np.array([rgb(stop) for stop in _VIRIDIS], np.uint8)
     return ramp[2:] if is_dark() else ramp[-2::-1]  # without what hardly differs from the canvas
 
 
-def residual_colors(residuals_m: Float64) -> UInt8:
-    """Return (N, 3) RGB of distances; NaN, for points without a partner, is `OUTLIER`."""
+def residual_colors(residuals_m: Float64, reach_m: float) -> UInt8:
+    """Return (N, 3) RGB of distances on a scale from 0 to `reach_m`."""
     ramp = residual_ramp()
-    place = np.clip(1e3 * residuals_m / LARGEST_MM, 0.0, 1.0) * (len(ramp) - 1)
+    place = np.clip(residuals_m / reach_m, 0.0, 1.0) * (len(ramp) - 1)
     shades = np.stack([np.interp(place, np.arange(len(ramp)), c) for c in ramp.T], axis=1)
-    shades[np.isnan(residuals_m)] = rgb(OUTLIER)
     return shades.astype(np.uint8)
 
 
@@ -50,7 +44,11 @@ def fill_with_ramp(painter: QPainter, where: QRectF) -> None:
 
 
 def draw_crosses(painter: QPainter, places_px: Float64, reach_px: float) -> None:
-    """Draw a cross at each of (N, 2) places, so that outliers differ not by colour alone."""
+    """Draw outliers, (N, 2): muted crosses, as most of them are at the wrist, where that is right.
+
+    The hand is cut there, in each cloud at another place.
+    """
+    painter.setPen(QColor(colors().muted))
     for slope in (-1.0, 1.0):
         arm_px = np.array([reach_px, slope * reach_px])
         ends = np.hstack([places_px - arm_px, places_px + arm_px])
@@ -58,7 +56,7 @@ def draw_crosses(painter: QPainter, places_px: Float64, reach_px: float) -> None
 
 
 class ResidualScale(QWidget):
-    """A colour scale from 0 to `LARGEST_MM`, and the cross of points without a partner."""
+    """A colour scale from 0, and the cross of points without a partner."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -72,18 +70,24 @@ class ResidualScale(QWidget):
         )
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setFixedHeight(max(_BAR_PX, self.fontMetrics().height()))
+        self._reach_m = 0.0
+
+    def show_reach(self, reach_m: float) -> None:
+        """Show a scale that ends at this residual."""
+        self._reach_m = reach_m
+        self.update()
 
     def paintEvent(self, _: QPaintEvent) -> None:
         """Draw the bar between its limits, and then the cross of outliers."""
         painter = QPainter(self)
         width_of = painter.fontMetrics().horizontalAdvance
-        low, high, outlier = tr("Residual 0"), f"≥ {LARGEST_MM:.0f} mm", tr("Outlier")
+        high, outlier = f"≥ {1e3 * self._reach_m:.1f} mm", tr("Outlier")
+        low = tr("Residual 0")
         gap, top = SPACING_PX / 2, (self.height() - _BAR_PX) / 2
         swatch = QRectF(self.width() - width_of(outlier) - gap - _BAR_PX, top, _BAR_PX, _BAR_PX)
         left = width_of(low) + gap
         bar = QRectF(left, top, swatch.x() - width_of(high) - 5 * gap - left, _BAR_PX)
         fill_with_ramp(painter, bar)
-        painter.setPen(QPen(QColor(OUTLIER), 2))
         draw_crosses(painter, np.array([swatch.center().toTuple()]), _BAR_PX / 2 - 1)
         painter.setPen(self.palette().windowText().color())
         for x, text in ((0.0, low), (bar.right() + gap, high), (swatch.right() + gap, outlier)):

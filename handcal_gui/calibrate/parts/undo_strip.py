@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
-from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QToolButton, QWidget
 
 from handcal_gui.app.keys import add_action
@@ -22,17 +21,16 @@ class UndoStrip(ElidedLabel):
     ----------
     parent : QWidget
         Widget in which Ctrl+Z undoes the deletion.
+    restore : callable
+        Undoes a deletion.
 
     Attributes
     ----------
     button : QToolButton
         Undoes the deletion; hidden with the text, and to be laid out beside or below it.
-    restore_requested : Signal(Deletion)
     """
 
-    restore_requested = Signal(object)
-
-    def __init__(self, parent: QWidget) -> None:
+    def __init__(self, parent: QWidget, restore: Callable[[Deletion], object]) -> None:
         super().__init__(parent)
         self.setObjectName("undoText")
         self._deletions: list[Deletion] = []
@@ -40,7 +38,7 @@ class UndoStrip(ElidedLabel):
             parent,
             tr("Undo"),
             "Ctrl+Z",
-            self._restore,
+            lambda: restore(self._deletions[-1]),
             tooltip=tr("Restore the deleted item (Ctrl+Z)"),
         )
         self._undo.setObjectName("undo")
@@ -58,6 +56,3 @@ class UndoStrip(ElidedLabel):
             self.setText(_TEXTS[deletions[-1].kind].format(deletions[-1].number))
         else:
             self.clear()
-
-    def _restore(self) -> None:
-        self.restore_requested.emit(self._deletions[-1])

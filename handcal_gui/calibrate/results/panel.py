@@ -13,7 +13,6 @@ from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
     QComboBox,
     QLabel,
-    QProgressBar,
     QPushButton,
     QStackedLayout,
     QStackedWidget,
@@ -26,18 +25,17 @@ from handcal.core.geometry import transform
 from handcal.core.progress import Progress
 from handcal.core.types import EYES, METHODS, Alignment, Eye, EyeShift, Float64, Method
 from handcal.register.benefit import DISTANCES_M
-from handcal.register.results import Results, SolveSettings
+from handcal.register.results import Results, SolveSettings, residuals_reach_m
 from handcal.session.record import SessionRecord, eye_trials
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.keys import add_action
-from handcal_gui.app.theme import SPACING_PX, follow_theme
+from handcal_gui.app.theme import SPACING_PX, colors, follow_theme
 from handcal_gui.app.translation import tr
-from handcal_gui.calibrate.parts.residual_scale import LARGEST_MM, OUTLIER, residual_ramp
+from handcal_gui.calibrate.parts.residual_scale import residual_ramp
 from handcal_gui.calibrate.parts.result_card import ResultCard
-from handcal_gui.engine.jobs import Job
 from handcal_gui.widgets.brief import copy_text
-from handcal_gui.widgets.fields import paragraph, with_name
-from handcal_gui.widgets.job_bar import show_share
+from handcal_gui.widgets.fields import paragraph
+from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, keep_space, vbox
 from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.result_rows import (
@@ -68,6 +66,7 @@ _DISTANCES = tr(
     "Only the eye's place is uncertain here: an error of the rig itself comes on top, and matters "
     "most far away."
 )
+_LINES = tr("Each line ends in the number of its alignment. One that ends level has converged.")
 _TO_POINTS, _TO_SURFACE = tr("Point RMS (mm)"), tr("Surface RMS (mm)")
 _MEANINGS = {
     _TO_POINTS: tr(
@@ -82,10 +81,6 @@ _MEANINGS = {
 }
 _SYMBOLS = {"left": "o", "right": "s"}
 _MAX_SYMBOLS = 60
-_MOST_FOR_NAMES = 0.6
-"""Of the width."""
-_TEXT_HEIGHT = 0.08
-"""Of a name, as a share of the plot's height."""
 _BESIDE = {"left": -0.01, "right": 0.01}
 """Distance of an eye's bars from their place, so that the eyes' do not hide each other."""
 _METHODS: Mapping[Method, str] = {
@@ -222,7 +217,10 @@ class ResultsPanel(QWidget):
 
     def _plots_tab(self) -> QWidget:
         tab, iterations, stack = QWidget(), QWidget(), QStackedWidget()
-        meaning = paragraph("", tr("A line that ends level has converged."))
+        meaning = paragraph(
+            "",
+            tr("Each line ends in the number of its alignment; one that ends level has converged."),
+        )
         meaning.setContentsMargins(SPACING_PX, 0, SPACING_PX, SPACING_PX // 2)
         vbox((self._convergence, 1), meaning, on=iterations, margins=0, spacing=0)
         self._choice = QComboBox()
@@ -297,13 +295,10 @@ class _ConvergencePlot(Plot):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("convergence", tr("Convergence"), tr("Iteration"), _TO_POINTS, parent)
         self.show_legend()
-        self._longest = 1
-        self.item.vb.sigResized.connect(self._leave_room)
 
     def show_results(self, results: Results) -> None:
-        """Replace the lines; each ends in its alignment's name."""
+        """Replace the lines; each ends in its alignment's number."""
         self.clear()
-        ends: list[tuple[float, int]] = []
         for number, shifts in results.alignments.items():
             for eye, shift in shifts.items():
                 rms_mm = 1e3 * np.sqrt(shift.history_m2)
@@ -314,50 +309,24 @@ class _ConvergencePlot(Plot):
                     symbol=_SYMBOLS[eye] if len(rms_mm) <= _MAX_SYMBOLS else None,
                 )
                 line.setData(np.arange(1, len(rms_mm) + 1), rms_mm)
-                ends.append((float(rms_mm[-1]), number))
+                self.add_text(str(number), len(rms_mm), float(rms_mm[-1]))
         solved = [shift for eyes in results.alignments.values() for shift in eyes.values()]
         measure = _TO_SURFACE if any(map(_is_to_surface, solved)) else _TO_POINTS
         self.item.setLabel("left", measure)
         self.setToolTip(_MEANINGS[measure])
         histories = [shift.history_m2 for shift in solved]
-        self._longest = longest = max(map(len, histories), default=1)
+        longest = max(map(len, histories), default=1)
         largest_mm = 1e3 * max((float(np.sqrt(max(one))) for one in histories), default=1e-3)
-        self._name(sorted(ends), _TEXT_HEIGHT * largest_mm)
-        self._leave_room()
+        self.item.setXRange(1, 1 + 1.1 * max(longest - 1, 1))  # with room for the last number
         self.item.setYRange(0.0, 1.1 * largest_mm)
         spacing = max(1, longest // 5)
         self.item.getAxis("bottom").setTickSpacing(spacing, spacing)
-
-    def _leave_room(self) -> None:
-        """Show the iterations, with space for the longest name at their end."""
-        room_px = self.item.vb.width()
-        text_px = self.widest_text_px + 3 * SPACING_PX
-        share = min(text_px / max(room_px, 1.0), _MOST_FOR_NAMES)
-        self.item.setXRange(1, 1 + (self._longest - 1 or 1) / (1.0 - share), padding=0.03)
-
-    def _name(self, ends: list[tuple[float, int]], height_mm: float) -> None:
-        """Name the alignments beside the ends of their lines, in one text for those that adjoin."""
-        while ends:
-            beside = [one for one in ends if one[0] - ends[0][0] <= height_mm]
-            text = _names(sorted({number for _, number in beside}))
-            # Right of all lines, because one that goes on would cross the name.
-            self.add_text(text, self._longest, float(np.mean([y_mm for y_mm, _ in beside])))
-            ends = ends[len(beside) :]
 
 
 def _is_to_surface(shift: EyeShift) -> bool:
     """Return whether an alignment's history was measured along normals, unlike its RMS."""
     is_rms = np.isclose(shift.history_m2[-1], shift.rms_m**2, rtol=1e-6, atol=0.0)
     return shift.method == "consistent" and not is_rms
-
-
-def _names(numbers: list[int]) -> str:
-    """Return *Alignment 1*, *Alignments 1, 2*, or *Alignments 1–5*."""
-    if len(numbers) == 1:
-        return tr("Alignment {}").format(numbers[0])
-    is_row = len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1
-    text = f"{numbers[0]}–{numbers[-1]}" if is_row else ", ".join(map(str, numbers))
-    return tr("Alignments {}").format(text)
 
 
 class _CompareTab(QWidget):
@@ -374,7 +343,6 @@ class _CompareTab(QWidget):
         self._results: Results | None = None
         self._record: SessionRecord | None = None
         self._settings = SolveSettings()
-        self._job: Job | None = None
         self.table = Table("comparison-of-methods", tr("Comparison of methods"))
         keep_space(self.table)
         self._methods = QComboBox()
@@ -384,21 +352,18 @@ class _CompareTab(QWidget):
         self._compare = QPushButton(tr("&Compare"))
         self._compare.setObjectName("comparison-start")
         self._compare.clicked.connect(self._ask)
-        self._cancel = QPushButton(tr("Ca&ncel"))
-        self._cancel.setObjectName("comparison-cancel")
-        self._cancel.clicked.connect(self._request_cancel)
-        self._progress = with_name(
-            QProgressBar(format="%p %"), "comparison-progress", tr("Progress")
-        )
-        self._progress.setTextVisible(False)
-        keep_space(self._progress)
-        self._progress.setMaximumHeight(SPACING_PX)
+        self._jobs = JobBar(tr("Ca&ncel"))
+        self._jobs.failed.connect(self.show_failure)
+        self._jobs.busy_changed.connect(self._on_busy)
         self._status = QLabel()
         self._status.setObjectName("comparison-status")
         self._status.setTextFormat(Qt.TextFormat.PlainText)
         self._status.setWordWrap(True)
-        self._lay_out()
-        self._set_busy(False)
+        label = QLabel(tr("Compare &with"))
+        label.setBuddy(self._methods)
+        row = hbox(label, (self._methods, 1), self._compare, spacing=SPACING_PX)
+        parts = row, self._jobs, self._status, (self.table, 1)
+        vbox(*parts, on=self, margins=SPACING_PX // 2, spacing=SPACING_PX)
 
     def use(self, record: SessionRecord, settings: SolveSettings) -> None:
         """Set the session to compare with."""
@@ -406,14 +371,11 @@ class _CompareTab(QWidget):
 
     def cancel(self) -> None:
         """Cancel the comparison, and wait for its end; nothing is shown."""
-        if self._job is not None:
-            self._job.abandon()
-            self._job = None
+        self._jobs.stop()
 
     def show_results(self, results: Results) -> None:
         """Set the results to compare with; an earlier comparison is removed."""
-        if self._cancel.isEnabled():
-            self._request_cancel()
+        self.cancel()
         self._results = results
         self._methods.clear()
         for method in METHODS:
@@ -424,7 +386,6 @@ class _CompareTab(QWidget):
 
     def show_comparison(self, other: Results) -> None:
         """Show another method's results of the same alignments."""
-        self._set_busy(False)
         if self._results is None:
             return
         columns = self._results.method, other.method, "Δ"
@@ -439,7 +400,6 @@ class _CompareTab(QWidget):
 
     def show_failure(self, text: str) -> None:
         """Show the reason why there is no comparison."""
-        self._set_busy(False)
         self._status.setText(text)
 
     def _explain(self, method: Method | Literal[""]) -> None:
@@ -448,46 +408,17 @@ class _CompareTab(QWidget):
 
     def _ask(self) -> None:
         method: Method = self._methods.currentText()  # type: ignore[assignment]
-        self._set_busy(True)
-        self._status.setText(tr("Solving with {} …").format(method))
-        self.cancel()
         record, settings = self._record, replace(self._settings, method=method)
 
         def work(progress: Progress) -> object:
             assert record is not None
             return solve_again(record, settings, progress)
 
-        self._job = Job(work)
-        self._job.progressed.connect(lambda _doing, share: show_share(self._progress, share))
-        self._job.succeeded.connect(self.show_comparison)
-        self._job.failed.connect(self.show_failure)
-        self._job.start()
+        self._jobs.run(tr("Solving with {}").format(method), work, self.show_comparison)
 
-    def _request_cancel(self) -> None:
-        self._set_busy(False)
-        self._status.setText(tr("Cancelled."))
-        if self._job is not None:  # without waiting: a method may take seconds to react
-            self._job.cancel()
-            self._job.succeeded.disconnect()
-            self._job.failed.disconnect()
-
-    def _set_busy(self, is_busy: bool) -> None:
-        self._progress.setRange(0, 0)
-        self._progress.setVisible(is_busy)
-        has_focus = self._compare.hasFocus() or self._cancel.hasFocus()
-        for one, is_offered in ((self._cancel, is_busy), (self._compare, not is_busy)):
-            one.setVisible(is_offered)  # in the same place
-            one.setEnabled(is_offered)
-            if is_offered and has_focus:
-                one.setFocus()
+    def _on_busy(self, is_busy: bool) -> None:
         self._methods.setEnabled(not is_busy)
-
-    def _lay_out(self) -> None:
-        label = QLabel(tr("Compare &with"))
-        label.setBuddy(self._methods)
-        row = hbox(label, (self._methods, 1), self._compare, self._cancel, spacing=SPACING_PX)
-        parts = row, self._progress, self._status, (self.table, 1)
-        vbox(*parts, on=self, margins=SPACING_PX // 2, spacing=SPACING_PX)
+        self._compare.setEnabled(not is_busy)
 
 
 class ResidualMap(Plot):
@@ -504,13 +435,12 @@ class ResidualMap(Plot):
             "residual-map", tr("Residual map"), tr("Right (mm)"), tr("Down (mm)"), parent
         )
         self._shown = np.empty((0, 2)), np.empty(0)
+        self._reach_m = 1.0
         self.scatters = (
             pg.ScatterPlotItem(size=4, pen=None),
             pg.ScatterPlotItem(size=5, symbol="x"),
         )
-        self._bar = pg.ColorBarItem(
-            values=(0.0, LARGEST_MM), width=14, interactive=False, label=tr("Residual (mm)")
-        )
+        self._bar = pg.ColorBarItem(width=14, interactive=False, label=tr("Residual (mm)"))
         item = self.item
         item.setAspectLocked()
         item.invertY()
@@ -519,7 +449,7 @@ class ResidualMap(Plot):
         item.layout.addItem(self._bar, 2, 5)
         follow_theme(self, self._redraw)
 
-    def show_residuals(self, places_m: Float64, residuals_m: Float64) -> None:
+    def show_residuals(self, places_m: Float64, residuals_m: Float64, reach_m: float) -> None:
         """Show points.
 
         Parameters
@@ -528,8 +458,10 @@ class ResidualMap(Plot):
             Right and down, as seen from the eye.
         residuals_m : (N,) float64
             NaN for points without a partner.
+        reach_m : float
+            End of the colour scale.
         """
-        self._shown = places_m, residuals_m
+        self._shown, self._reach_m = (places_m, residuals_m), reach_m
         self._redraw()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -546,13 +478,14 @@ class ResidualMap(Plot):
         self._bar.setColorMap(palette)
         for side in ("left", "right"):
             self._bar.getAxis(side).setTextPen(self.palette().windowText().color())
+        self._bar.setLevels((0.0, 1e3 * self._reach_m))
         shades = [pg.mkBrush(c) for c in palette.getLookupTable(0.0, 1.0, _SHADES)]
-        shade = (_SHADES / LARGEST_MM * 1e3 * residuals_m[~is_outlier]).astype(int)
+        shade = (_SHADES / self._reach_m * residuals_m[~is_outlier]).astype(int)
         inliers, outliers = self.scatters
         inliers.setData(
             pos=1e3 * places_m[~is_outlier], brush=[shades[min(i, _SHADES - 1)] for i in shade]
         )
-        outliers.setData(pos=1e3 * places_m[is_outlier], pen=OUTLIER)
+        outliers.setData(pos=1e3 * places_m[is_outlier], pen=colors().muted)
 
 
 class ResidualsTab(QWidget):
@@ -570,13 +503,14 @@ class ResidualsTab(QWidget):
         super().__init__(parent)
         self.setObjectName("residuals")
         self._solved: dict[int, tuple[Alignment, Mapping[Eye, EyeShift]]] = {}
+        self._reach_m = 1.0
         self._choice = QComboBox()
         self._choice.setObjectName("residuals-choice")
         self._choice.setAccessibleName(tr("Alignment and eye"))
         self._choice.currentIndexChanged.connect(self._show_chosen)
         self._map = ResidualMap()
         note = QLabel(
-            tr("The hand as seen from the eye; a magenta × is a point without a partner (outlier).")
+            tr("The hand as seen from the eye; a grey × is a point without a partner (outlier).")
         )
         note.setWordWrap(True)
         vbox(self._choice, (self._map, 1), note, on=self, spacing=SPACING_PX)
@@ -588,6 +522,7 @@ class ResidualsTab(QWidget):
             for number, shifts in results.alignments.items()
             if number in alignments
         }
+        self._reach_m = residuals_reach_m(results) if self._solved else 1.0
         self._choice.clear()
         for number, (_, shifts) in self._solved.items():
             for eye in shifts:
@@ -604,10 +539,10 @@ class ResidualsTab(QWidget):
             return
         chosen = self._choice.currentData()
         if chosen is None:
-            self._map.show_residuals(np.empty((0, 2)), np.empty(0))
+            self._map.show_residuals(np.empty((0, 2)), np.empty(0), self._reach_m)
             return
         number, eye = chosen
         alignment, shifts = self._solved[number]
         hand_E_m = transform(alignment.T_E_W[eye], alignment.hand_m)
-        self._map.show_residuals(hand_E_m[:, :2], shifts[eye].residuals_m)
+        self._map.show_residuals(hand_E_m[:, :2], shifts[eye].residuals_m, self._reach_m)
         self.shown.emit(number, eye)

@@ -89,12 +89,11 @@ class SessionPanel(QWidget):
         self.notes = NotesEditor()
         self._unwritten = paragraph("unwritten")
         self._unwritten.hide()
-        self._meaning = ElidedLabel()
-        self._strip = UndoStrip(self)
-        self._strip.restore_requested.connect(
+        self._strip = UndoStrip(
+            self,
             lambda one: self.submit(
                 tr("restore the {}").format(one.kind), lambda s: s.restore(one.kind, one.number)
-            )
+            ),
         )
         self._tabs = RecordTabs()
         self._open_folder = QPushButton(tr("&Open folder"))
@@ -140,7 +139,6 @@ class SessionPanel(QWidget):
 
     def _refresh(self) -> None:
         record = self._record
-        self._show_note()
         self._open_folder.setEnabled(record is not None)
         self.inspect_button.setEnabled(record is not None and bool(record.alignments))
         self.export_button.setEnabled(record is not None)
@@ -158,14 +156,6 @@ class SessionPanel(QWidget):
             self._show_eye_distance(record.facts.eye_distance)
         self._strip.show_deletions([] if self._is_read_only else deletions(record))
         self._tabs.setTabText(0, tr("Alignments ({})").format(len(record.alignments)))
-
-    def _show_note(self) -> None:
-        """Explain the numbers of alignments or trials while they are in sight."""
-        record, shown, meaning = self._record, self._tabs.currentWidget(), ""
-        if record is not None and record.alignments and shown is self._alignments:
-            meaning = tr("φ of each alignment alone; the result is in Results")
-        self._meaning.setText(meaning)
-        self._meaning.setVisible(bool(meaning))
 
     def _show_eye_distance(self, stored: EyeDistance | None) -> None:
         is_told = stored is not None and stored.source == "headset"
@@ -215,8 +205,9 @@ class SessionPanel(QWidget):
         keep_space(self._strip.button)
         buttons = self._open_folder, self.inspect_button, self.export_button
         row = hbox(self._strip.button, 1, *buttons, spacing=SPACING_PX)
-        self._tabs.currentChanged.connect(self._show_note)
-        parts = form, (self._tabs, 1), self._unwritten, self._meaning, self._strip, row
+        meaning = tr("φ of each alignment alone; the result is in Results")
+        self._tabs.setTabToolTip(0, meaning)
+        parts = form, (self._tabs, 1), self._unwritten, self._strip, row
         vbox(*parts, on=self, margins=SPACING_PX, spacing=SPACING_PX)
 
 

@@ -46,6 +46,8 @@ _PRESETS: dict[Preset | Literal[""], str] = {
     "high_density": tr("High density"),
     "medium_density": tr("Medium density"),
 }
+_LASER_STEP_MW = 30
+"""One step below 0 mW, the number stands for the camera's own setting."""
 
 
 class CameraSettingsDialog(QDialog):
@@ -74,27 +76,19 @@ class CameraSettingsDialog(QDialog):
             _PRESETS,
             tr("The RealSense SDK's visual preset; the settings below take precedence."),
         )
-        self._exposure = _OwnNumber(
-            tr("Exposure of depth"),
-            _number(
-                "exposure",
-                1,
-                200_000,
-                500,
-                " µs",
-                tr("Of the depth image; a frame lasts 33,333 µs."),
-            ),
-            tr("&Automatic"),
-            8_500,
+        self._exposure = _number(
+            "exposure", 0, 200_000, 500, " µs", tr("Of the depth image; a frame lasts 33,333 µs.")
         )
-        self._laser = _OwnNumber(
-            tr("Laser power"),
-            _number(
-                "laser", 0, 360, 30, " mW", tr("Power of the projector; 0 mW switches it off.")
-            ),
-            tr("&Keep the camera's setting"),
-            150,
+        self._exposure.setSpecialValueText(tr("Automatic"))
+        self._laser = _number(
+            "laser",
+            -_LASER_STEP_MW,
+            360,
+            _LASER_STEP_MW,
+            " mW",
+            tr("Power of the projector; 0 mW switches it off."),
         )
+        self._laser.setSpecialValueText(_AS_IT_IS)
         self._whole = with_name(
             QCheckBox(tr("For the &whole image, even once a hand is found")),
             "wholeImage",
@@ -119,8 +113,8 @@ class CameraSettingsDialog(QDialog):
             serial=self._serial,
             profile=self._profile.currentData(),
             preset=self._preset.currentData() or None,
-            exposure_us=self._exposure.value,
-            laser_power_mw=self._laser.value,
+            exposure_us=float(self._exposure.value()) or None,
+            laser_power_mw=None if self._laser.value() < 0 else float(self._laser.value()),
             expose_whole_image=self._whole.isChecked(),
             spatial_filter=self._spatial.isChecked(),
             temporal_filter=self._temporal.isChecked(),
@@ -130,8 +124,9 @@ class CameraSettingsDialog(QDialog):
     def _show(self, settings: RealSenseSettings) -> None:
         self._profile.setCurrentIndex(self._profile.findData(settings.profile))
         self._preset.setCurrentIndex(self._preset.findData(settings.preset or ""))
-        self._exposure.show_value(settings.exposure_us)
-        self._laser.show_value(settings.laser_power_mw)
+        self._exposure.setValue(round(settings.exposure_us or 0))
+        power_mw = settings.laser_power_mw
+        self._laser.setValue(-_LASER_STEP_MW if power_mw is None else round(power_mw))
         self._whole.setChecked(settings.expose_whole_image)
         self._spatial.setChecked(settings.spatial_filter)
         self._temporal.setChecked(settings.temporal_filter)
@@ -165,45 +160,6 @@ class CameraSettingsDialog(QDialog):
         buttons.rejected.connect(self.reject)
         what = paragraph("cameraAbout", _ABOUT)
         vbox(what, form, buttons, on=self, margins=2 * SPACING_PX, spacing=2 * SPACING_PX)
-
-
-class _OwnNumber(QWidget):
-    """A number, or a checked box that leaves it to the camera.
-
-    Parameters
-    ----------
-    label : str
-        Accessible name, for screen readers.
-    number : QSpinBox
-    left : str
-        Label of the box that leaves it to the camera.
-    usual : int
-        Number to start from when the box is unchecked.
-    """
-
-    def __init__(self, label: str, number: QSpinBox, left: str, usual: int) -> None:
-        super().__init__()
-        self._number, self._usual = number, usual
-        number.setAccessibleName(label)
-        self._left = with_name(
-            QCheckBox(left),
-            f"{number.objectName()}Left",
-            f"{label}: {left.replace('&', '')}",
-            number.toolTip(),
-        )
-        self._left.toggled.connect(number.setDisabled)
-        self.setFocusProxy(self._left)  # the number may be disabled
-        fill_row(self, number, self._left, grows=self._left)
-
-    @property
-    def value(self) -> float | None:
-        """The number; None if it is left to the camera."""
-        return None if self._left.isChecked() else float(self._number.value())
-
-    def show_value(self, value: float | None) -> None:
-        """Show a number; None leaves it to the camera."""
-        self._left.setChecked(value is None)
-        self._number.setValue(round(self._usual if value is None else value))
 
 
 def _number(name: str, low: int, high: int, step: int, unit: str, help_text: str) -> QSpinBox:

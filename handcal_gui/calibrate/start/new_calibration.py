@@ -6,10 +6,9 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from PySide6.QtCore import QEvent, Qt, QTimer, Signal
+from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
 from PySide6.QtWidgets import (
-    QAbstractButton,
     QApplication,
     QComboBox,
     QCompleter,
@@ -23,6 +22,7 @@ from handcal.session.state import MAX_WEARER_CHARACTERS, clean_wearer
 from handcal.station.checks.doctor import Finding, Health
 from handcal.station.checks.preflight import Part, is_ready
 from handcal.station.settings import StationSettings
+from handcal_gui.app.keys import native
 from handcal_gui.app.preferences import Preferences
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
@@ -31,8 +31,7 @@ from handcal_gui.calibrate.start.station_form import StationForm
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.widgets.brief import limit_length
 from handcal_gui.widgets.fields import button, main_button, paragraph, with_name
-from handcal_gui.widgets.key_cap import KeyCap
-from handcal_gui.widgets.layouts import hbox, keep_space, scrollable, vbox
+from handcal_gui.widgets.layouts import hbox, scrollable, vbox
 from handcal_gui.widgets.sentence import sentence
 
 Check = Callable[[StationSettings, str, Progress], Mapping[Part, Finding]]
@@ -40,8 +39,6 @@ Check = Callable[[StationSettings, str, Progress], Mapping[Part, Finding]]
 _SETTLE_MS, _AGAIN_MS = 300, 3000
 _AGAIN_BY_PROCESS_MS = 10_000
 """For a RealSense, which another process looks for: 0.2 s of processor time."""
-_AGAIN_UNSEEN_MS = 60_000
-"""While another program has the keys: a camera plugged in meanwhile is found on return."""
 
 
 class NewCalibration(Card):
@@ -98,8 +95,7 @@ class NewCalibration(Card):
         self.form = StationForm(wearer, preferences.station, pairing_key)
         self._problem = paragraph("startProblem")
         self._button = main_button("start", tr("Start calibration"))
-        self._start_key = KeyCap("startKey", "Return")
-        keep_space(self._start_key)
+        self._button.setToolTip(native("Return"))
         self._cancel = button("cancelOpening", tr("Cancel"), help_text=tr("Cancel the start (Esc)"))
         # Without focus, a second press of the key that started it does not cancel.
         self._cancel.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -118,10 +114,7 @@ class NewCalibration(Card):
         self.form.changed.connect(self._settle.start)
         self._button.clicked.connect(self.start)
         self._cancel.clicked.connect(self._cancel_opening)
-        app = QApplication.instance()
-        assert isinstance(app, QApplication)
-        app.focusChanged.connect(self._show_key)
-        self._allow_start(False)
+        self._button.setEnabled(False)
         self.show_preferences(preferences)
 
     @property
@@ -155,10 +148,6 @@ class NewCalibration(Card):
         self._wearer.setCurrentIndex(-1)
         self._wearer.setEditText(typed)
 
-    def set_rig(self, path: str) -> None:
-        """Show another rig file."""
-        self.form.set_rig(path)
-
     def set_pairing_key(self, pairing_key: str) -> None:
         """Use another key for network headsets."""
         self._key = pairing_key
@@ -185,7 +174,7 @@ class NewCalibration(Card):
         except ValueError:
             self._wearer.setFocus()  # the reason is below the name
             return
-        self._allow_start(False)
+        self._button.setEnabled(False)
         self.check()
 
     def set_opening(self, is_opening: bool) -> None:
@@ -196,7 +185,7 @@ class NewCalibration(Card):
         self._cancel.setEnabled(True)
         self._problem.setText(tr("Opening camera and headset…") if is_opening else "")
         if is_opening:
-            self._allow_start(False)
+            self._button.setEnabled(False)
             self.setFocus()
         else:
             self._wearer.setFocus()
@@ -226,13 +215,6 @@ class NewCalibration(Card):
         self._wearer.setFocus()
         self.check()
 
-    def changeEvent(self, event: QEvent) -> None:
-        """Check the station when the window gets the keys again, unless that was just done."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.ActivationChange and self._again.isActive():
-            since_ms = self._again.interval() - self._again.remainingTime()
-            self._again.start(max(self._again_ms() - since_ms, 0))
-
     def hideEvent(self, event: QHideEvent) -> None:
         """Stop checking the station."""
         super().hideEvent(event)
@@ -240,8 +222,6 @@ class NewCalibration(Card):
         self._again.stop()
 
     def _again_ms(self) -> int:
-        if not self.isActiveWindow():
-            return _AGAIN_UNSEEN_MS
         return _AGAIN_BY_PROCESS_MS if self.settings.source == "realsense" else _AGAIN_MS
 
     def _question(self) -> tuple[StationSettings, str]:
@@ -253,7 +233,7 @@ class NewCalibration(Card):
         self.form.show_findings(findings)
         broken = [part.what for part in findings.values() if part.health is Health.BROKEN]
         self._problem.setText(tr("Fix first: {}.").format(", ".join(broken)) if broken else "")
-        self._allow_start(is_ready(findings))
+        self._button.setEnabled(is_ready(findings))
         wearer, self._starting = self._starting, None
         if wearer is not None and is_ready(findings):
             self.start_requested.emit(self.form.settings, wearer)
@@ -266,18 +246,6 @@ class NewCalibration(Card):
     def _show_problem(self, why: str) -> None:
         self._starting = None
         self._problem.setText(why)
-
-    def _allow_start(self, is_ready: bool) -> None:
-        self._button.setEnabled(is_ready)
-        self._show_key(None, QApplication.focusWidget())
-
-    def _show_key(self, _old: QWidget | None, new: QWidget | None) -> None:
-        """Show the key that starts while it would, and not press another button."""
-        is_here = new is self or (new is not None and self.isAncestorOf(new))
-        self._start_key.setVisible(
-            self._button.isEnabled()
-            and (new is None or (is_here and not isinstance(new, QAbstractButton)))
-        )
 
     def _drop_blanks(self, typed: str) -> None:
         """Take no blanks before a name: the space bar pressed the former page's button."""
@@ -300,9 +268,7 @@ class NewCalibration(Card):
         self._wearer_problem.setVisible(bool(problem))
 
     def _lay_out(self) -> None:
-        last = hbox(
-            (self._problem, 1), self._cancel, self._start_key, self._button, spacing=SPACING_PX
-        )
+        last = hbox((self._problem, 1), self._cancel, self._button, spacing=SPACING_PX)
         form = scrollable(self.form)
         # Or the page around it would scroll, and hide the button.
         form.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)

@@ -82,14 +82,11 @@ class StartPage(QWidget):
     new : NewCalibration
     unfinished, recent : SessionList
     evaluate : QPushButton
-    library_requested : Signal(Path)
-        The user wants to see all sessions in a folder.
-    example_requested : Signal(Path)
-        The user wants to open the example; the session folder to copy it to.
+    show_library : callable
+        Shows all sessions in a folder.
+    open_example : callable
+        Opens the example, copied to a folder of sessions.
     """
-
-    example_requested = Signal(object)
-    library_requested = Signal(object)
 
     def __init__(
         self,
@@ -101,6 +98,8 @@ class StartPage(QWidget):
     ) -> None:
         super().__init__(parent)
         self.setObjectName("startPage")
+        self.show_library: Callable[[Path], object] = lambda _folder: None
+        self.open_example: Callable[[Path], object] = lambda _folder: None
         self._newest: tuple[Path, ...] = ()
         self._folder = Path()
         self.new = NewCalibration(preferences, pairing_key, check)
@@ -140,8 +139,8 @@ class StartPage(QWidget):
         self._find.answered.connect(self._show_sessions)
         self.new.form.changed.connect(self._look_in_another_folder)
         browse.clicked.connect(self.browse)
-        example.clicked.connect(lambda: self.example_requested.emit(self._folder))
-        library.clicked.connect(lambda: self.library_requested.emit(self._folder))
+        example.clicked.connect(lambda: self.open_example(self._folder))
+        library.clicked.connect(lambda: self.show_library(self._folder))
         self.show_preferences(preferences)
 
     def show_preferences(self, preferences: Preferences) -> None:
@@ -154,14 +153,6 @@ class StartPage(QWidget):
         """Remember the entries, also those with which nothing was started."""
         if self.new.is_changed:
             current.change(station=self.new.settings)
-
-    def set_rig(self, path: Path) -> None:
-        """Show another rig file; other entries stay as they are."""
-        self.new.set_rig(str(path))
-
-    def set_pairing_key(self, pairing_key: str) -> None:
-        """Use another key for network headsets."""
-        self.new.set_pairing_key(pairing_key)
 
     def set_opening(self, is_opening: bool) -> None:
         """Allow only cancelling while a station is being opened."""

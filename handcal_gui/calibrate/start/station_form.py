@@ -122,7 +122,7 @@ class StationForm(QWidget):
         self.connect_headset: Callable[[], object] = lambda: None
         self.calibrate_rig = button("calibrateRig", tr("Cali&brate…"), tr("Calibrate a rig"))
         self._findings = {part: FindingLine(part) for part in PARTS}
-        self._calibration = CalibrationFields()
+        self._calibration = CalibrationFields("calibration.")
         self._grid = grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(2 * SPACING_PX)
@@ -151,22 +151,20 @@ class StationForm(QWidget):
             self._add_row(TITLES[part], rows[part])
             self._findings[part].keep_room()
             grid.addWidget(self._findings[part], grid.rowCount(), 1)
-        advanced, advanced_fields = self._advanced_fields()
-        grid.addWidget(advanced, grid.rowCount(), 1)
+        grid.addWidget(self._advanced(), grid.rowCount(), 1)
         grid.setRowStretch(grid.rowCount(), 1)  # or the fields move apart on a tall page
         self._bound = Bound(
             {"plan.name": self._plan, "rig": rig, "sessions": sessions}
             | source_fields
             | headset_fields
-            | advanced_fields,
-            {"loss": 100.0, "reorder": 100.0},
+            | self._calibration.fields,
+            {"loss": 100.0, "reorder": 100.0} | self._calibration.factors,
             self,
         )
         self.show_settings(settings)
         self._source.currentIndexChanged.connect(self._suit_gate)
         self._bound.changed.connect(self._on_changed)
         self._eyes.currentIndexChanged.connect(self._on_changed)
-        self._calibration.changed.connect(self._on_changed)
 
     @property
     def settings(self) -> StationSettings:
@@ -176,7 +174,6 @@ class StationForm(QWidget):
         return replace(
             settings,
             realsense=replace(self._realsense, serial=settings.realsense.serial),
-            calibration=self._calibration.take(settings.calibration),
             plan=replace(
                 settings.plan,
                 usable_eyes=_USABLE[self._eyes.currentData()] if is_recommended else EYES,
@@ -189,8 +186,8 @@ class StationForm(QWidget):
         self._is_showing = True
         self._settings = settings
         self._realsense = settings.realsense
-        self._bound.show(settings)
-        self._calibration.show_settings(settings.calibration)
+        with self._calibration.any_gate():
+            self._bound.show(settings)
         usable = {*settings.plan.usable_eyes}
         name = next(key for key, eyes in _USABLE.items() if {*eyes} == usable)
         self._eyes.setCurrentIndex(self._eyes.findData(name))
@@ -207,17 +204,12 @@ class StationForm(QWidget):
 
     def show_findings(self, findings: Mapping[Part, Finding]) -> None:
         """Show the finding about each part, with a button if one click can fix it."""
-        letters = set[str]()
         for part, finding in findings.items():
             fix, changes = _fix(part, finding, self.settings)
             mend: Callable[[], object] = partial(self._change, changes)
             is_awaited = finding.health is Health.LIMITED and self.settings.headset == "network"
             if part == "headset" and is_awaited and not fix:
                 fix, mend = tr("Co&nnect…"), self.connect_headset
-            letter = fix.partition("&")[2][:1]
-            if letter in letters:  # M, of which the camera comes first
-                fix = fix.replace("&", "")
-            letters.add(letter)
             self._findings[part].show_finding(finding, fix, mend)
 
     def edit_realsense(self) -> None:
@@ -323,7 +315,7 @@ class StationForm(QWidget):
         self._of_network = address, pairing
         return field, {"headset": self._headset, "host": host, "port": port}
 
-    def _advanced_fields(self) -> tuple[QWidget, dict[str, QWidget]]:
+    def _advanced(self) -> QWidget:
         """Return the rarely changed settings, folded at first."""
         real_time = with_name(
             QCheckBox(tr("Real time")),
@@ -337,14 +329,12 @@ class StationForm(QWidget):
         seed = whole_number("seed", 0, 999_999, tr("Seed of the simulated wearer, hand and room."))
         loss = number("loss", 0.0, 50.0, 1.0, " %", tr("Datagrams dropped in each direction."))
         reorder = number("reorder", 0.0, 50.0, 1.0, " %", tr("Datagrams delivered out of order."))
-        for text, row in (
-            (tr("Recordings"), playback),
-            (tr("Simulated hand"), side),
-            (tr("Simulated wearer"), seed),
-            (tr("Simulated loss"), loss),
-            (tr("Simulated reordering"), reorder),
-        ):
-            self._calibration.add_row(text, row)
+        self._calibration.add(tr("Recordings"), playback)
+        self._calibration.fields |= {"playback.real_time": real_time, "playback.loop": loop}
+        self._calibration.add(tr("Simulated hand"), side, "side")
+        self._calibration.add(tr("Simulated wearer"), seed, "seed")
+        self._calibration.add(tr("Simulated loss"), loss, "loss")
+        self._calibration.add(tr("Simulated reordering"), reorder, "reorder")
         fold = with_name(QToolButton(), "advanced")
         fold.setAutoRaise(True)
         fold.setText(tr("&Advanced"))
@@ -365,14 +355,7 @@ class StationForm(QWidget):
         advanced = QWidget()
         parts = vbox(fold, self._calibration, on=advanced, margins=0, spacing=SPACING_PX)
         parts.setAlignment(fold, Qt.AlignmentFlag.AlignLeft)
-        return advanced, {
-            "playback.real_time": real_time,
-            "playback.loop": loop,
-            "side": side,
-            "seed": seed,
-            "loss": loss,
-            "reorder": reorder,
-        }
+        return advanced
 
     def _add_row(self, title: str, field: QWidget) -> None:
         """Add a field, with its title aligned with the field's first line."""
@@ -397,5 +380,5 @@ def _fix(part: Part, finding: Finding, settings: StationSettings) -> tuple[str, 
     if part == "headset" and is_virtual and not is_simulated:
         return tr("Use a networ&k headset"), {"headset": "network"}
     if part == "rig" and is_broken and settings.rig:
-        return tr("Use the exa&mple"), {"rig": ""}
+        return tr("Use the example"), {"rig": ""}
     return "", {}

@@ -143,11 +143,11 @@ class TrialsPanel(QWidget):
         )
         self._statistics = Table("statistics-of-trials", tr("Statistics of trials"))
         self._plot = TrialPlot()
-        self._strip = UndoStrip(self)
-        self._strip.restore_requested.connect(
+        self._strip = UndoStrip(
+            self,
             lambda one: self.submit(
                 tr("restore the trial"), lambda s: s.restore(one.kind, one.number)
-            )
+            ),
         )
         self._lay_out()
         self._refresh()

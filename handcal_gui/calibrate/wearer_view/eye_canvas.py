@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from itertools import product
 
 import numpy as np
@@ -15,16 +15,23 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from handcal.core.types import Float64
 from handcal.station.wearer_view import EyeView
 from handcal_gui.app.theme import SPACING_PX, colors
-from handcal_gui.calibrate.parts.legend import DOTS_APART, HALO_PX, draw_dots, role_color
+from handcal_gui.calibrate.parts.legend import role_color
 from handcal_gui.calibrate.parts.paint_turns import update_in_turn
 
 LINES = {
     "hand": ("text", (1.0, Qt.PenStyle.SolidLine)),
     "drawn": ("live", (2.0, Qt.PenStyle.DashLine)),
     "cursor": ("cursor", (3.0, Qt.PenStyle.SolidLine)),
-    "offline": ("muted", (3.0, Qt.PenStyle.DotLine)),
+    "offline": ("muted", (2.0, Qt.PenStyle.DotLine)),
 }
 """Colour of each kind of outline, and width in pixels and style of its line."""
+_DASHES: dict[Qt.PenStyle, tuple[float, float]] = {
+    Qt.PenStyle.DashLine: (4.0, 3.0),
+    Qt.PenStyle.DotLine: (1.5, 1.5),
+}
+"""Lengths of dashes and gaps, in widths of the line."""
+_HALO_PX = 2.0
+"""Added to the width of a line for that of its ground over an image."""
 _FEW_POINTS = 120
 """Outlines of so few points, such as a target, are drawn as they are."""
 _SMOOTHED_POINTS = 5
@@ -138,6 +145,8 @@ class EyeCanvas(QWidget):
         ]
         if self._is_drawn_shown:
             outlines += [("drawn", view.drawn.outline_px), ("drawn", view.drawn_target_px)]
+        if self._is_offline_shown:
+            outlines.insert(0, ("offline", view.offline.outline_px))
         to_widget = self._to_widget()
         painter.setClipRect(to_widget.mapRect(_display(view)))
         spacing_px = _SPACING_PX / to_widget.m11()
@@ -147,24 +156,17 @@ class EyeCanvas(QWidget):
             if len(px)
         ]
         scale = self.devicePixelRatio()
-        has_image = not self._image.isNull()
-        if self._is_offline_shown and len(offline_px := view.offline.outline_px):
-            role, (width_px, _) = LINES["offline"]
-            halo = colors().canvas if has_image else ""
-            offset_px = np.array([to_widget.dx(), to_widget.dy()])
-            line_px = to_widget.m11() * simplified(offline_px, spacing_px)
-            places = _evenly(line_px + offset_px, DOTS_APART * width_px)
-            draw_dots(painter, places, role_color(role, self), width_px, halo)
-        if has_image:
+        if not self._image.isNull():
             for what, line in lines:
-                painter.setPen(_pen(colors().canvas, scale * (LINES[what][1][0] + HALO_PX)))
+                painter.setPen(_pen(colors().canvas, scale * (LINES[what][1][0] + _HALO_PX)))
                 painter.drawPolyline(line)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         for what, line in lines:
             role, (width_px, style) = LINES[what]
             pen = _pen(role_color(role, self), 1.0, style)
-            if style is Qt.PenStyle.DashLine:
-                pen.setDashPattern([scale * 4.0 * width_px, scale * 3.0 * width_px - 1.0])
+            if style in _DASHES:
+                dash, gap = _DASHES[style]
+                pen.setDashPattern([scale * dash * width_px, scale * gap * width_px - 1.0])
             painter.setPen(pen)
             _draw_wide(painter, line, round(scale * width_px))
 
@@ -269,15 +271,6 @@ def simplified(outline_px: Float64, spacing_px: float) -> Float64:
 def _closed(outline_px: Float64) -> QPolygonF:
     line: QPolygonF = arrayToQPolygonF(*np.vstack([outline_px, outline_px[:1]]).T)
     return line
-
-
-def _evenly(outline_px: Float64, apart_px: float) -> Iterator[tuple[int, int]]:
-    """Return pixels along a closed outline, at equal distances."""
-    x, y = outline_px.T
-    path = np.append(x + 1j * y, x[0] + 1j * y[0])
-    ends_px = np.append(0.0, np.abs(np.diff(path)).cumsum())
-    places = np.interp(np.arange(0.0, ends_px[-1], apart_px), ends_px, path)
-    return zip(places.real.astype(int).tolist(), places.imag.astype(int).tolist(), strict=True)
 
 
 def _draw_wide(painter: QPainter, line: QPolygonF, width: int) -> None:

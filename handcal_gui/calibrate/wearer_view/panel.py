@@ -32,10 +32,8 @@ _LEGEND = {
     "offline": (tr("Before"), tr("The hand's outline as drawn before calibration, with φ = 0")),
 }
 
-_SHAPE = 4.0 / 3.0
-"""Width of an eye's picture relative to its height, as mostly cropped to a hand."""
 _NUMBER_SCALE = 0.85
-"""Font scale at which both eyes' numbers fit side by side into a narrow dock."""
+"""Font scale at which both eyes' numbers fit side by side into a narrow column."""
 
 
 class WearerViewPanel(QWidget):
@@ -70,9 +68,6 @@ class WearerViewPanel(QWidget):
             message = _CLOSED if is_closed else missing
             is_solved = procedure.results is not None and eye in procedure.results.eyes
             column.show_view(snapshot.views.get(eye), message, is_solved=is_solved)
-        has_image = any(view.image is not None for view in snapshot.views.values())
-        for entry in self._entries.values():
-            entry.show_on_image(has_image)
         show_alike([column.canvas for column in self._eyes.values()])
 
     def _lay_out(self, whole: QCheckBox, before: QCheckBox) -> None:

@@ -27,10 +27,7 @@ def test_a_demonstration_calibrates_exports_and_takes_pictures(
     qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     codes: list[int] = []
-    kept = {
-        name: getattr(QApplication, name)
-        for name in ("sendPostedEvents", "activeModalWidget", "sendEvent")
-    }
+    kept = {name: getattr(QApplication, name) for name in ("sendPostedEvents", "sendEvent")}
     application = SimpleNamespace(quit=lambda: codes.append(0), exit=codes.append, **kept)
     monkeypatch.setattr(autopilot, "QApplication", application)
     monkeypatch.setattr(autopilot, "_LOOK_S", 0.05)
@@ -58,7 +55,6 @@ def test_a_demonstration_calibrates_exports_and_takes_pictures(
     names = {path.stem for path in (tmp_path / "pictures").glob("*.png")}
     assert {f"step-{i}" for i in range(1, 8)} <= {name[:6] for name in names}
     assert {"panel-camera", "panel-results", "panel-fine-tune", "panel-session"} <= names
-    assert {"start", "window-trial-doubt", "export-done", "review", "preferences"} <= names
+    assert {"start", "window-fine-tune", "export-done", "review", "preferences"} <= names
     assert {"station", "sessions", "rig", "evaluate", "support", "manual"} <= names
     assert {"keys", "rig-6", "evaluate-5", "camera-settings"} <= names
-    assert {"rig-take", "rig-acceptRig", "evaluate-track"} <= names

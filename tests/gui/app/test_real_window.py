@@ -361,23 +361,6 @@ def resume_and_quit(display: Display, session: Path, preferences: Path) -> None:
         window.end_well()
 
 
-@pytest.mark.slow  # tests/gui/app/test_autopilot.py covers all but the X server
-def test_the_autopilot_calibrates_exports_and_takes_pictures(
-    display: Display, tmp_path: Path, preferences: Path
-) -> None:
-    pictures = ARTEFACTS / "autopilot"
-    with Window(
-        display,
-        *("--source", "simulator", "--autopilot", "--output", tmp_path / "result"),
-        *("--screenshots", pictures, "--preferences", preferences),
-    ) as window:
-        window.end_well()
-    assert len(list((tmp_path / "result").glob("*/report.pdf"))) == 1
-    names = {path.stem for path in pictures.glob("*.png")}
-    assert {f"step-{i}" for i in range(1, 8)} <= {name[:6] for name in names}
-    assert {"panel-camera", "panel-results", "panel-fine-tune", "panel-session"} <= names
-
-
 def test_the_autopilot_says_where_it_got_stuck(display: Display, tmp_path: Path) -> None:
     rig = tmp_path / "rig.yaml"
     rig.write_text("%YAML:1.0\n")

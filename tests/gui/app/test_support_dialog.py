@@ -23,7 +23,7 @@ def test_the_dialog_writes_a_bundle(
     qtbot.addWidget(dialog)
     dialog.show()
     assert "to the handcal developers" in text(dialog, "supportAbout")
-    announced = text(dialog, "supportDoing")
+    announced = text(dialog, "supportWill")
     folder, write = dialog.findChildren(PathField)[0], child(dialog, QPushButton, "writeBundle")
     folder.set_path("")
     assert not write.isEnabled(), "or it would be written wherever the program was started"

@@ -15,7 +15,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.core.types import Float64
 from handcal_gui.app.theme import colors, follow_theme, icon, is_dark, use_theme
-from handcal_gui.calibrate.parts.residual_scale import OUTLIER, residual_ramp
+from handcal_gui.calibrate.parts.residual_scale import residual_ramp
 
 
 @pytest.fixture
@@ -156,16 +156,7 @@ def test_colour_blind_people_tell_the_colours_of_states_apart(
 
 
 @pytest.mark.usefixtures("themes")
-@pytest.mark.parametrize("theme", ["light", "dark", "contrast"])
-def test_colour_blind_people_tell_outliers_from_residuals(
-    theme: Literal["light", "dark", "contrast"],
-) -> None:
-    use_theme(theme)
-    for who, seen in SEEN_BY.items():
-        outlier = lab(np.array(seen) @ linear_rgb(QColor(OUTLIER)))
-        for color in residual_ramp().tolist():
-            other = lab(np.array(seen) @ linear_rgb(QColor(*color)))
-            assert np.linalg.norm(outlier - other) >= LEAST_DIFFERENCE, (who, color)
-    assert contrast(QColor(OUTLIER), QColor(colors().canvas)) >= 3.0
-    if theme != "light":  # where the best points are the darkest
-        assert contrast(QColor(*residual_ramp()[0].tolist()), QColor(colors().canvas)) >= 2.5
+@pytest.mark.parametrize("theme", ["dark", "contrast"])
+def test_the_best_points_stand_out_from_the_canvas(theme: Literal["dark", "contrast"]) -> None:
+    use_theme(theme)  # in light colours, the best points are the darkest
+    assert contrast(QColor(*residual_ramp()[0].tolist()), QColor(colors().canvas)) >= 2.5

@@ -72,7 +72,7 @@ def test_the_preferences_keep_what_is_typed_and_the_settings_of_one_run(
     program.use_for_one_run(replace(program.preferences.station, seed=7))
     wearer = child(program.start, QComboBox, "wearer")
     wearer.setEditText("P 07")
-    program.start.set_rig(tmp_path / "rig.yaml")
+    program.start.new.form.set_rig(str(tmp_path / "rig.yaml"))
     program.windows.edit_preferences()
     shown = program.start.new.settings
     assert (shown.seed, shown.rig) == (7, str(tmp_path / "rig.yaml"))

@@ -60,8 +60,8 @@ def test_the_wizard_one_eye_after_the_other_by_the_space_bar(
     assert "Ada" not in file.path.read_text()  # only in the session
     assert stored.sessions == (str(record.path),)
     assert stored.station == studio.settings
-    [cloud] = window.panels.cloud.findChildren(CloudView)
-    window.panels.cloud.show_alignment(record.alignments[1])
+    [cloud], first = window.panels.cloud.findChildren(CloudView), record.alignments[1]
+    window.panels.cloud.show_alignment(first, np.zeros(len(first.hand_m)), 1.0)
     shown_first: list[str] = []
     live.program.live.opened.connect(lambda _: shown_first.append(cloud.accessibleDescription()))
     live.program.start_calibration(studio.settings, "Grace")

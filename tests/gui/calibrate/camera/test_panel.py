@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QImage
-from PySide6.QtWidgets import QComboBox, QFileDialog, QLabel, QMessageBox, QToolButton
+from PySide6.QtWidgets import QComboBox, QFileDialog, QMessageBox, QToolButton
 from pytestqt.qtbot import QtBot
 
 from handcal.core.errors import FileError
@@ -57,15 +57,6 @@ def test_the_numbers_change_five_times_a_second(panel: CameraPanel, snapshot: Ma
     assert shown == list("00004444")
 
 
-def test_numbers_do_not_move_the_rest(panel: CameraPanel, snapshot: Maker) -> None:
-    panel.show_snapshot(snapshot())
-    places = [label.geometry() for label in panel.findChildren(QLabel)]
-    panel.show_snapshot(
-        snapshot(camera={"rate_hz": 0.0, "dropped": 99_999}, t_host_ns=NOW_NS + 9_900_000_000)
-    )
-    assert [label.geometry() for label in panel.findChildren(QLabel)] == places
-
-
 @pytest.mark.parametrize(
     ("mode", "color", "depth"),
     [(Mode.COLOR, True, False), (Mode.DEPTH, False, True), (Mode.BOTH, True, True)],
@@ -79,23 +70,6 @@ def test_either_picture_or_both(
     combo.setCurrentText(mode)
     assert view(panel, "colour").isVisible() == color
     assert view(panel, "depth").isVisible() == depth
-
-
-def test_both_pictures_lie_where_they_are_larger(
-    panel: CameraPanel, snapshot: Maker, qtbot: QtBot
-) -> None:
-    panel.set_mode(Mode.BOTH)
-    panel.show_snapshot(snapshot())
-    color, depth = view(panel, "colour"), view(panel, "depth")
-    panel.resize(380, 420)
-    qtbot.waitUntil(lambda: _corner(depth).y() >= _corner(color).y() + color.height())
-    panel.resize(900, 320)
-    qtbot.waitUntil(lambda: _corner(depth).x() >= _corner(color).x() + color.width())
-    assert _corner(depth).y() == _corner(color).y()
-
-
-def _corner(view: ImageView) -> QPoint:
-    return view.mapTo(view.window(), QPoint())
 
 
 def test_the_hand_is_drawn_in_both_pictures(panel: CameraPanel, snapshot: Maker) -> None:

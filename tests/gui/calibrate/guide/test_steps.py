@@ -147,11 +147,7 @@ def test_the_end_says_what_was_reached(
     snapshot: Maker, name: VerdictName, is_verified: bool, action: Action, label: str, says: str
 ) -> None:
     done = planned_snapshot(snapshot, StepName.DONE, verified=BOTH if is_verified else {})
-    assert done.procedure.results is not None
-    verdicts = dict.fromkeys(EYES, Verdict(name, "as told"))
-    results = replace(done.procedure.results, verdicts=verdicts)
-    done = replace(done, procedure=replace(done.procedure, results=results))
-    view = begun().view(done)
+    view = begun().view(with_verdicts(done, name, name))
     assert says in view.sentence
     assert (view.main.action, view.main.label) == (action, label)
     other = Action.FINISH if action is Action.ANOTHER else Action.ANOTHER
@@ -163,10 +159,7 @@ def test_the_end_says_what_was_reached(
 
 def test_a_verification_before_the_last_alignment_is_not_of_the_result(snapshot: Maker) -> None:
     done = planned_snapshot(snapshot, StepName.DONE, verified=BOTH)
-    assert done.procedure.results is not None
-    verdicts = dict.fromkeys(EYES, Verdict("accept", "as told"))
-    results = replace(done.procedure.results, verdicts=verdicts)
-    done = replace(done, procedure=replace(done.procedure, results=results))
+    done = with_verdicts(done, "accept", "accept")
     assert begun().view(done).sentence.startswith("The wearer has verified and")
     aligned = replace(done, record=replace(done.record, verified_now=frozenset()))
     view = begun().view(aligned)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtWidgets import QApplication, QLabel
+from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from handcal.calibration.states import CalibrationSettings, State
@@ -20,11 +20,6 @@ from tests.gui.helpers import child
 Make = Callable[..., Snapshot]
 TURNED = (
     "Your hand is turned by 14.0°, more than 9°. Tip your fingers away from you and confirm again."
-)
-TWO_LINES = "Hand cut by the image border; move it toward the middle"
-THREE_LINES = (
-    "The arm points along the camera's line of sight; raise the hand so that its palm or its back "
-    "faces the camera"
 )
 
 
@@ -206,21 +201,3 @@ def test_the_history_has_no_numbers_before_there_is_a_limit(
     assert axis._tickLevels == [[]], "pyqtgraph's own would overlap"
     panel.show_snapshot(snapshot())
     assert len(axis._tickLevels[0]) == 1
-
-
-def test_curve_and_limit_are_apart_in_a_window_of_1280x720(
-    panel: RotationPanel, snapshot: Make
-) -> None:
-    panel.resize(360, 208)  # its size there
-    panel.show()
-    panel.show_snapshot(snapshot())
-    QApplication.processEvents()
-    history = child(panel, Plot, "rotation-history")
-    assert history.isVisible()
-    assert history.item.vb.height() >= 26, "half of it between no rotation and the limit"
-
-
-def test_it_fits_a_small_dock(panel: RotationPanel) -> None:
-    smallest = panel.minimumSizeHint()
-    assert smallest.width() <= 300
-    assert smallest.height() <= 220

@@ -176,7 +176,7 @@ def test_the_pairing_key_is_hidden_until_asked_for(open_page: Callable[..., Star
     assert shown.displayText() == KEY
     button(page, "copyKey").click()
     assert QGuiApplication.clipboard().text() == KEY
-    page.set_pairing_key("another key of the same headset")
+    page.new.set_pairing_key("another key of the same headset")
     assert shown.text() == "another key of the same headset"
     choose(page, "headset", "virtual")
     assert not shown.isVisible()

@@ -220,17 +220,3 @@ def test_the_cursor_keeps_its_colour_over_an_image(canvas: EyeCanvas) -> None:
     long_px = SIZE[0] / canvas.crop_px.width() * np.linalg.norm(sides_px, axis=1).sum()
     is_cursor = np.abs(_pixels(canvas).astype(int) - rgb(colors().cursor)).max(axis=2) < 10
     assert is_cursor.sum() > 1.5 * long_px
-
-
-def test_the_outline_before_is_dots_with_halos_of_their_own(canvas: EyeCanvas) -> None:
-    """A halo along the whole line made it a band with specks."""
-    world = np.full((DISPLAY.height_px // 2, DISPLAY.width_px // 2, 3), (0, 0, 255), np.uint8)
-    canvas.show_view(_view(drawn_shift_m=np.array([0.01, 0.0, 0.0]), image=world))
-    without = _pixels(canvas).astype(int)
-    canvas.show_offline(True)
-    pixels = _pixels(canvas).astype(int)
-    is_new = (pixels != without).any(axis=2).astype(np.uint8)
-    dots, _ = cv2.connectedComponents(is_new)
-    assert dots > 20
-    is_dot = np.abs(pixels - rgb(colors().muted)).max(axis=2) < 20
-    assert is_dot.sum() > 4 * 20

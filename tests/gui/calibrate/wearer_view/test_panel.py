@@ -138,28 +138,6 @@ def test_options_change_both_eyes(panel: WearerViewPanel, snapshot: MakeSnapshot
         assert _canvas(panel, eye).crop_px.width() == snapshot().views[eye].width_px
 
 
-def test_it_fits_into_a_small_dock_and_does_not_jump(
-    panel: WearerViewPanel, snapshot: MakeSnapshot
-) -> None:
-    empty = panel.minimumSizeHint()
-    panel.show_snapshot(snapshot())
-    assert panel.minimumSizeHint() == empty
-    assert empty.width() <= 300
-    assert empty.height() <= 210
-
-
-def test_numbers_of_three_digits_have_room(panel: WearerViewPanel, snapshot: MakeSnapshot) -> None:
-    """Thirty millimetres of eye shift move the outline by more than a hundred pixels."""
-    width = panel.minimumSizeHint().width()
-    views = {
-        eye: replace(view, drawn=replace(view.drawn, error_px=123.4, error_arcmin=172.5))
-        for eye, view in snapshot().views.items()
-    }
-    panel.show_snapshot(snapshot(views=views))
-    assert _texts(panel, "left")[1:3] == ["123.4 px", "172.5′"]
-    assert panel.minimumSizeHint().width() == width
-
-
 def test_both_eyes_are_shown_in_one_scale(panel: WearerViewPanel, snapshot: MakeSnapshot) -> None:
     now = snapshot()
     right = now.views["right"]

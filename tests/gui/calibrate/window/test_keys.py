@@ -35,20 +35,8 @@ from handcal_gui.calibrate.sections import TITLES
 from handcal_gui.calibrate.window import MainWindow
 from handcal_gui.engine.engine_thread import Command
 from handcal_gui.widgets.table import Table
-from tests.gui.calibrate.window.conftest import Maker, main_button, offer_solve, press, say
+from tests.gui.calibrate.window.conftest import Maker, main_button, press, say
 from tests.gui.views import begun
-
-
-def test_space_asks_for_what_comes_next_and_escape_closes_the_message(
-    window: MainWindow, qtbot: QtBot
-) -> None:
-    window.show_page("live")
-    offer_solve(window)
-    with qtbot.waitSignal(main_button(window).clicked, timeout=1000):
-        QTest.keyClick(window, Qt.Key.Key_Space)
-    window.banner.show_message("Could not solve")
-    QTest.keyClick(window, Qt.Key.Key_Escape)
-    assert window.banner.text == ""
 
 
 def test_keys_that_repeat_one_held_down_are_recognized(window: MainWindow) -> None:
@@ -143,7 +131,7 @@ def show_buttons(program: Program, snapshot: Snapshot, *, is_enabled: bool) -> l
     main = ButtonSpec(Action.TAKE_STEP, "Solve", is_enabled)
     say(program, snapshot, WizardView(Step.SOLVE, "", (), main, others))
     asked: list[object] = []
-    program.wizard_panel.asked.connect(asked.append)
+    program.wizard_panel.bar.do = asked.append
     for table in window.findChildren(Table):
         table.selectRow(0)
     return asked
@@ -272,7 +260,7 @@ def test_keys_move_the_outline_the_way_they_point_and_only_while_it_is_verified(
     window.activateWindow()
     qtbot.waitActive(window)
     moved: list[tuple[float, float, float]] = []
-    guide.nudged.connect(lambda *nudge: moved.append(nudge))
+    guide.nudge = lambda *nudge: moved.append(nudge)
     keys = (Qt.Key.Key_Left, Qt.Key.Key_Right, Qt.Key.Key_Up, Qt.Key.Key_Down)
     guide.start(begun())
     guide.show_snapshot(snapshot(State.ALIGN))

@@ -14,9 +14,10 @@ from pytestqt.qtbot import QtBot
 from handcal.calibration.states import State
 from handcal_gui.app.preferences import PreferencesFile
 from handcal_gui.app.program import Program
+from handcal_gui.calibrate.guide.view import Action
 from handcal_gui.calibrate.sections import LEFT, RIGHT, TABS
 from handcal_gui.calibrate.window import MainWindow
-from tests.gui.calibrate.window.conftest import Maker, main_button, press
+from tests.gui.calibrate.window.conftest import Maker, main_button, offer_solve, press
 from tests.gui.helpers import child
 
 FIVE = (*LEFT, *RIGHT)
@@ -127,6 +128,49 @@ def test_a_panel_can_be_a_window_of_its_own_and_comes_back(
     section.close()
     assert not section.isWindow()
     assert section.window() is window
+
+
+def test_keys_work_in_a_panel_that_is_a_window_of_its_own(
+    program: Program, window: MainWindow, qtbot: QtBot
+) -> None:
+    window.show_page("live")
+    offer_solve(window)
+    asked: list[object] = []
+    program.wizard_panel.bar.do = asked.append
+    section = window.sections["results"]
+    section.set_apart(True)
+    section.activateWindow()
+    qtbot.waitActive(section)
+    QTest.qSleep(2)  # as `press`
+    QTest.keyClick(section.windowHandle(), Qt.Key.Key_Space)
+    qtbot.waitUntil(lambda: asked == [Action.TAKE_STEP])
+    # On a real screen, Qt looks for keys of the main window only from windows of this kind.
+    assert section.windowType() is Qt.WindowType.Tool
+    window.banner.show_message("The hand is cut by the image border.")
+    QTest.keyClick(section.windowHandle(), Qt.Key.Key_Escape)
+    assert window.banner.text == ""
+    section.close()
+
+
+def test_a_small_window_leaves_nothing_behind_in_the_next_run(
+    program: Program, qtbot: QtBot, snapshot: Maker, tmp_path: Path
+) -> None:
+    def widths(one: MainWindow) -> list[int]:
+        one.resize(1920, 1050)
+        one.show_page("live")
+        one.follow(snapshot(State.APPLIED))
+        QApplication.processEvents()
+        return [section.width() for section in one.sections.values()]
+
+    wide = widths(program.window)
+    program.window.resize(1024, 700)
+    QApplication.processEvents()
+    program.window.close()
+    again = Program(PreferencesFile(tmp_path / "preferences.json"))
+    qtbot.addWidget(again.window)
+    again.window.show()
+    assert widths(again.window) == wide
+    again.window.close()
 
 
 def test_keys_open_a_panel_and_give_it_the_keyboard(window: MainWindow, qtbot: QtBot) -> None:

@@ -15,9 +15,9 @@ from handcal.core.progress import Progress
 from handcal.export import window_3d
 from handcal.export.outcome import SessionOutcome
 from handcal.session.session import SessionRecord
+from handcal_gui.app import separate_windows
 from handcal_gui.app.preferences import PreferencesFile
 from handcal_gui.app.program import Program
-from handcal_gui.calibrate.control import inspection
 
 PATIENCE_MS = 20_000
 
@@ -49,7 +49,7 @@ def test_one_window_at_a_time_is_open_until_the_program_closes(
         closed.release()
         raise CancelledError("closed")
 
-    monkeypatch.setattr(inspection, "inspect_session", show)
+    monkeypatch.setattr(separate_windows, "inspect_session", show)
     open_session(program, qtbot, record)
     program.window.panels.session.inspect_button.click()
     qtbot.waitUntil(lambda: len(shown) == 1, timeout=PATIENCE_MS)
@@ -81,10 +81,3 @@ def test_a_window_that_cannot_open_says_why(
 def test_without_an_alignment_nothing_opens(program: Program) -> None:
     program.windows.inspect()
     assert "nothing to inspect: open a session first" in program.window.banner.text
-    menu = program.window.menus["File"]
-    menu.aboutToShow.emit()
-    [entry] = [one for one in menu.actions() if "Inspect" in one.text()]
-    assert entry.text() == "&Inspect in 3D (open a session first)"
-    assert not entry.isEnabled()
-    menu.aboutToHide.emit()
-    assert (entry.text(), entry.isEnabled()) == ("&Inspect in 3D", True)
