@@ -30,6 +30,18 @@ Eye: TypeAlias = Literal["left", "right"]
 EYES: tuple[Eye, Eye] = ("left", "right")
 EyePlan: TypeAlias = Literal["both", "each", "left", "right"]
 PlanName: TypeAlias = Literal["paper", "recommended"]
+PLAN_WORDS: Mapping[EyePlan | PlanName | None, str] = MappingProxyType(
+    {
+        "recommended": "Recommended",
+        "paper": "As in the paper",
+        "both": "As in the paper, both eyes at once",
+        "each": "As in the paper, one eye after the other",
+        "left": "As in the paper, the left eye",
+        "right": "As in the paper, the right eye",
+        None: "not recorded",
+    }
+)
+"""A session's plan in the words that people read."""
 Method: TypeAlias = Literal["paper", "linear", "consistent", "icp", "icp-open3d"]
 METHODS: tuple[Method, ...] = ("paper", "linear", "consistent", "icp", "icp-open3d")
 """The last needs the extra ``3d``; studies leave it out unless it is requested."""

@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 
 from handcal.core.types import (
     EYES,
+    PLAN_WORDS,
     Alignment,
     Eye,
     EyeShift,
@@ -251,7 +252,7 @@ def _summary(outcome: SessionOutcome) -> Section:
                     "Begun": at_minute(outcome.started),
                     "Rig": record.rig.name,
                     **({"Simulated": record.simulated} if record.simulated else {}),
-                    "Plan": record.facts.plan or "not recorded",
+                    "Plan": PLAN_WORDS[record.facts.plan],
                     "Method": outcome.settings.method,
                     "Alignments": str(len(record.alignments)),
                     "Confirmations refused": str(record.refused),

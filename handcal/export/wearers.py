@@ -94,8 +94,8 @@ class WearersSummary:
             )
         if trials:
             text += (
-                f" In {_count(trials.values, 'user-test trial')} the mean reprojection error was "
-                f"{_mean_sd(trials)}."
+                f" In {_count(trials.values, 'user-test trial')} the mean reprojection error of "
+                f"the φ calibrated then was {_mean_sd(trials)}."
             )
         if self.comparisons:
             text += (

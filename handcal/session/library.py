@@ -15,7 +15,7 @@ import numpy as np
 
 from handcal.core.errors import FileError
 from handcal.core.progress import Progress
-from handcal.core.types import EYES, Eye, VerdictName
+from handcal.core.types import EYES, PLAN_WORDS, Eye, VerdictName
 from handcal.io.files import make_folder, read_limited, sync_folder
 from handcal.io.lock import FileLock
 from handcal.register.benefit import expected_arcmin
@@ -291,7 +291,7 @@ def _read(path: Path, stamp: tuple[int, int]) -> LibraryEntry:
         former_wearers=tuple(state.former_wearers),
         rig=_rig_name(path, state),
         headset=state.facts.headset.name if state.facts.headset else "",
-        plan=state.facts.plan or "",
+        plan=PLAN_WORDS[state.facts.plan] if state.facts.plan else "",
         eye_distance_m=_eye_distance_m(state),
         notes=_notes(path, state),
         is_simulated=bool(simulated_parts(state.settings or {})),

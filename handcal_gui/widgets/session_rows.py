@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from handcal.core.types import EYES
+from handcal.core.types import EYES, PLAN_WORDS
 from handcal.register.results import Results
 from handcal.report.cells import signed
 from handcal.session.session import SessionRecord
@@ -100,7 +100,7 @@ def session_facts(record: SessionRecord) -> dict[str, str]:
     facts = {
         tr("Started"): local_time(record.events[0].time, "%Y-%m-%d %H:%M UTC%z"),
         tr("Rig"): record.rig.name,
-        tr("Plan"): str(record.facts.plan or ""),
+        tr("Plan"): PLAN_WORDS[record.facts.plan] if record.facts.plan else "",
         tr("Method"): str((record.results or {}).get("method", "")),
         tr("Simulated"): record.simulated,
         tr("Compared blindly"): tr("better with the calibration {}, without {}, neither {}").format(

@@ -113,7 +113,7 @@ def test_the_spread_counts_each_wearer_once() -> None:
     assert (trials.values, trials.mean, trials.sd_between) == (2, 3.0, None)
     assert trials.sd_within == pytest.approx(np.std([2.0, 4.0], ddof=1))
     assert "5.0′ ± 2.8′ (mean ± SD between wearers, n = 2)" in summary.sentence
-    assert "2 user-test trials the mean reprojection error was 3.0′ (one wearer)" in (
+    assert "2 user-test trials the mean reprojection error of the φ calibrated then was 3.0′ (" in (
         summary.sentence
     )
     written = {r["quantity"]: r for r in summary_rows(summary)}

@@ -96,6 +96,7 @@ class Wizard:
     def __init__(self) -> None:
         self.is_held = False
         self._page: Step | None = Step.CONNECT
+        self._has_moved = False
         self._latest = Step.SHOW_HAND
 
     @property
@@ -108,6 +109,8 @@ class Wizard:
         planned = snapshot.next_step
         if self._page is Step.SAVE and is_unsolved(snapshot):
             self._page = None
+        if not self._has_moved and snapshot.procedure.verifying is not None:
+            self._page = None  # the wearer goes on with the verification in which a session stopped
         if self._page is not None:
             return self._page
         step = _STATES.get(snapshot.procedure.state)
@@ -136,6 +139,7 @@ class Wizard:
         """
         if action not in _MOVES:
             raise ValueError(f"{action} is an action of the engine")
+        self._has_moved = True
         if self._page is None or action is Action.FINISH:
             self._page = _MOVES[action]
         else:
@@ -423,7 +427,7 @@ def connect_view(snapshot: Snapshot) -> WizardView:
     former = snapshot.record.facts.former
     puts_on, label, fact = tr("Put the headset on the wearer"), tr("Begin"), ""
     if begun := _made(snapshot.record):
-        label = tr("Continue")
+        puts_on, label = tr("Make sure that the headset sits as before"), tr("Continue")
         fact = tr("This session continues where it stopped, with {}.").format(begun)
     elif former:
         puts_on = tr("Make sure that the headset sits well on the wearer")

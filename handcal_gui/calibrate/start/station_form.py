@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 
 from handcal.camera.recordings import RECORDING_SUFFIXES
 from handcal.camera.settings import RealSenseSettings
-from handcal.core.types import EYES, Eye, PlanName
+from handcal.core.types import EYES, PLAN_WORDS, Eye
 from handcal.station.checks.doctor import Finding, Health
 from handcal.station.checks.preflight import PARTS, Part, gate_problem
 from handcal.station.settings import (
@@ -57,7 +57,7 @@ TITLES: dict[Part, str] = {
     "rig": tr("&Rig file"),
     "sessions": tr("&Session folder"),
 }
-_PLANS: dict[PlanName, str] = {"recommended": tr("Recommended"), "paper": tr("As in the paper")}
+_PLANS = {name: PLAN_WORDS[name] for name in ("recommended", "paper")}
 _PLAN_HELP = tr(
     "Recommended: the hand is raised once; the cursors are placed where they are most\n"
     "informative, and each eye is verified. The steps run automatically.\n"

@@ -59,7 +59,7 @@ if TYPE_CHECKING:
 RECORD = tr("record the trial")
 _MEANING = tr(
     "A trial is the error of the calibrated φ relative to the φ with which the drawn target covers "
-    "the real one. It does not change the calibration: afterwards the calibrated φ is drawn again."
+    "the real one. It does not change the calibration: afterwards the final φ is drawn again."
 )
 _UNTOUCHED = tr(
     "φ of the {} has not been moved since the trial began. Move it first, or press T again if the "

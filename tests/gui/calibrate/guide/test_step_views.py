@@ -382,6 +382,13 @@ def test_a_confirmation_waits_for_enough_images_and_says_so(snapshot: Maker) -> 
         assert enough.main.is_enabled
 
 
+def test_a_verification_in_which_a_session_stopped_goes_on_at_once(snapshot: Maker) -> None:
+    wizard, seen = Wizard(), snapshot(State.VERIFY, procedure={"verifying": NUDGED})
+    assert wizard.view(seen).step is Step.VERIFY, "the wearer is asked, so the guide says it"
+    wizard.move(Action.BACK)
+    assert wizard.view(seen).step is Step.CONNECT
+
+
 def test_a_resumed_session_says_that_it_continues(snapshot: Maker, record: SessionRecord) -> None:
     new = connect_view(snapshot(State.SHOW_HAND, record=replace(record, alignments={})))
     assert (new.main.label, new.fact) == ("Begin", "")
