@@ -128,6 +128,7 @@ class FineTunePanel(QWidget):
         self._history.indexChanged.connect(self._refresh)
         self._burst = 0  # changes of one burst are undone together
         self._burst_of: tuple[tuple[Eye, ...], int] | None = None
+        self._is_verifying = False
         self._stream = ShiftStream(self._send, self._record, self)
         self._make_actions()
         self._lay_out()
@@ -185,7 +186,8 @@ class FineTunePanel(QWidget):
         is_same = is_same_shifts(solved, self._solved) and is_same_shifts(
             calibrated, self._calibrated
         )
-        if is_new or obstacle != self._obstacle or not is_same:
+        was, self._is_verifying = self._is_verifying, snapshot.procedure.verifying is not None
+        if is_new or obstacle != self._obstacle or not is_same or was != self._is_verifying:
             self._obstacle, self._solved, self._calibrated = obstacle, solved, calibrated
             self._refresh()
         sign, text = ("wait", obstacle) if obstacle else _ARRIVALS[self._stream.arrival]
@@ -290,7 +292,7 @@ class FineTunePanel(QWidget):
         )
 
     def _effect(self, eye: Eye) -> DrawnMove | None:
-        if self._rig is None:
+        if self._rig is None or self._is_verifying:  # the guide tells how the wearer moves it
             return None
         before_m = self._calibrated.get(eye, _OFFLINE[eye])
         after_m, depth_m = self._drawn()[eye], self._depth.currentData()
@@ -482,6 +484,7 @@ class _EyeEditor(QWidget):
             with QSignalBlocker(field), QSignalBlocker(slider):
                 field.setValue(value_mm)
                 slider.setValue(round(_SLIDER_STEPS_PER_MM * value_mm))
+        self._effect.setText("")
         if effect is not None:
             rows = (
                 (tr("Right"), effect.right_px, effect.right_arcmin),

@@ -316,7 +316,7 @@ class _Bars(QWidget):
         return QSize(26 * SPACING_PX, lines * self._line_px())
 
     def minimumSizeHint(self) -> QSize:
-        return self.sizeHint()
+        return QSize(self._name_px() + self._text_px() + 2 * SPACING_PX, self.sizeHint().height())
 
     def px_per_arcmin(self) -> float:
         """Return the scale of the bars."""

@@ -114,9 +114,7 @@ class StartPage(QWidget):
             tr("Open a session"), tr("Review it, compare methods, export it."), "folder"
         )
         self._open.setObjectName("open")
-        self.recent = SessionList(
-            tr("Recent sessions"), tr("&Open"), tr("Recent sessions will be listed here.")
-        )
+        self.recent = SessionList(tr("Recent sessions"), tr("&Open"))
         example = button("example", tr("E&xample"), tr("Open the example session"))
         example.setToolTip(tr("A simulated wearer's session, copied to the session folder"))
         browse = button("browse", tr("Choose fo&lder…"))
@@ -136,6 +134,7 @@ class StartPage(QWidget):
         self._evaluate.add_to_head(self.evaluate)
         self._lay_out()
         self._find = LatestJob(lambda question: find_sessions(*question), self)
+        self.recent.say_empty(tr("Looking for sessions…"))
         self._find.answered.connect(self._show_sessions)
         self.new.form.changed.connect(self._look_in_another_folder)
         browse.clicked.connect(self.browse)
@@ -188,6 +187,7 @@ class StartPage(QWidget):
     def _show_sessions(self, _question: object, offers: KnownSessions) -> None:
         self.unfinished.show_entries(offers.unfinished)
         self._resume.setVisible(bool(offers.unfinished))
+        self.recent.say_empty(tr("No session yet; the newest will be listed here."))
         self.recent.show_entries(offers.recent)
         self.new.show_wearers(offers.wearers)
 
@@ -222,8 +222,6 @@ class SessionList(QWidget):
         For screen readers, such as "Unfinished sessions".
     verb : str
         Label of the button.
-    empty : str
-        Text shown if the list is empty.
 
     Attributes
     ----------
@@ -232,9 +230,7 @@ class SessionList(QWidget):
 
     chosen = Signal(object)
 
-    def __init__(
-        self, name: str, verb: str, empty: str = "", parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, name: str, verb: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._list = with_name(QListWidget(), "sessions", name)
         self._list.setWordWrap(True)
@@ -248,7 +244,7 @@ class SessionList(QWidget):
         self._list.itemActivated.connect(self._choose)
         self._list.currentItemChanged.connect(self._refresh)
         self._button.clicked.connect(self._choose)
-        self._empty = paragraph("empty", empty)
+        self._empty = paragraph("empty")
         self._empty.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._layout = vbox(
             (self._empty, 1), (self._list, 1), on=self, margins=0, spacing=SPACING_PX // 2
@@ -293,6 +289,10 @@ class SessionList(QWidget):
             if entry.is_enabled and (self._list.currentItem() is None or entry.path == kept_path):
                 self._list.setCurrentItem(item)
         self._refresh()
+
+    def say_empty(self, text: str) -> None:
+        """Set the text that stands in place of an empty list."""
+        self._empty.setText(text)
 
     def add_button(self, added: QPushButton) -> None:
         """Add a button before the list's own; the legend then has a line of its own."""
