@@ -44,7 +44,7 @@ SENSOR_OPTIONS = (
         choices=("d415", "ahat", "exact"),
         default="d415",
         help="the simulated depth camera: a stereo camera with its faults at edges, a "
-        "time-of-flight camera, or a stereo camera whose edges are right (default: d415)",
+        "time-of-flight camera, or a stereo camera whose edges are right",
     ),
     value(
         "--fatten-px",

@@ -211,12 +211,12 @@ def _next_step(verdict: VerdictName, settings: DemoSettings, session: str) -> st
             )
         case "repeat" if settings.eye_distance == "none":
             return (
-                "Measure the distance of the eyes, too: handcal demo "
+                "Use it as it is, or measure the distance of the eyes, too: handcal demo "
                 f"--seed {settings.seed} --plan recommended --eye-distance ruler"
             )
         case "repeat":
             return (
-                "Do what the reason above says, or try another wearer: "
+                "Use it as it is, do what the reason above says, or try another wearer: "
                 f"handcal demo --seed {settings.seed + 1} --plan recommended"
             )
         case _:

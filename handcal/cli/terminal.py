@@ -127,7 +127,7 @@ class _Help(argparse.HelpFormatter):
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
         default = action.default
-        if default is None or default is False or default in ("", (), argparse.SUPPRESS):
+        if default is None or isinstance(default, bool) or default in ("", (), argparse.SUPPRESS):
             return action.help
         shown = " ".join(map(str, default)) if isinstance(default, tuple) else default
         return f"{action.help} (default: {shown})"

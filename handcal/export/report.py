@@ -147,7 +147,9 @@ def error_text(outcome: SessionOutcome, eye: Eye) -> str:
         return "not solved"
     if drawn.kind == "offline":
         return f"error {arcmin:.1f}′ expected with the offline calibration"
-    how = "verified by the wearer" if outcome.is_verified(eye) else "expected"
+    how = "expected"
+    if outcome.is_verified(eye):
+        how = "expected after the wearer's verification"
     return f"error {arcmin:.1f}′ {how}, {before:.1f}′ before"
 
 
@@ -350,7 +352,9 @@ def _distances(outcome: SessionOutcome, results: Results) -> Section:
 def _reason(verdict: Verdict, shift: EyeShift) -> str:
     """Return why an eye is judged so, and why the solver stopped if it ran."""
     return (
-        f"{verdict.reason} (stopped: {shift.stop_reason})" if shift.iterations else verdict.reason
+        f"{verdict.reason} (registration stopped: {shift.stop_reason})"
+        if shift.iterations
+        else verdict.reason
     )
 
 
@@ -540,7 +544,8 @@ DEFINITIONS = {
         "applied if the headset acknowledged it and rendered with it at the end."
     ),
     "verdict": (
-        "Good: accepted. Not yet: more alignments or verifications are needed. No better than "
+        "Good: accepted. Not yet: the error is over the target, or it is not sure enough that the "
+        "calibration is better than none; the headset draws with it all the same. No better than "
         "before: the offline calibration is kept. Impossible: the eye would lie where no eye is. "
         "Contradicted: camera, headset or rig speak against the result. In CSV and JSON: accept, "
         "repeat, keep, implausible, contradicted."

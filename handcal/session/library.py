@@ -68,7 +68,7 @@ class EyeOutcome:
     final: str = ""
     """The final φ in words, as `handcal.session.drawn.DrawnShift` gives it; empty if unknown."""
     kind: ShiftKind | None = None
-    """Where the final φ comes from; None if unknown."""
+    """The kind of the final φ; None if unknown."""
     is_verified: bool = False
     """True if the wearer verified what is final, with the present alignments."""
 

@@ -141,7 +141,7 @@ def test_the_verdict_says_that_trials_contradict_it(outcome: SessionOutcome) -> 
 
 
 def test_a_phi_set_by_hand_is_not_called_good(outcome: SessionOutcome) -> None:
-    """What was judged, verified and drawn in the figure is the solved φ."""
+    """Another φ was judged and verified, and is drawn in the figure."""
     assert outcome.results is not None
     accepted = dict.fromkeys(EYES, Verdict("accept", "as told"))
     by_hand = DrawnShift("set by hand", np.array([0.02, 0.0, 0.0]), is_drawn=True)

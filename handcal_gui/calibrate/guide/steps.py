@@ -370,10 +370,7 @@ def _not_accepted_view(preconditions: tuple[Precondition, ...], snapshot: Snapsh
         again.sort(key=lambda eye: -results.benefits[eye].after_arcmin)  # the worse one first
     if any(one.verdict in UNUSABLE for one in preconditions):
         text = tr("Do not use this result. Follow the advice below, then add alignments.")
-    elif results is not None and not any(
-        is_helpful(one, results.benefits[eye], snapshot.settings.solve.verdict)
-        for eye, one in results.advice.items()
-    ):
+    elif not _more_helps(snapshot):
         text = tr("Not good yet, and more would hardly change that. Finish as it is, or go on.")
         main = ButtonSpec(end_action(snapshot), tr("Finish as it is"))
         return WizardView(Step.VERIFY, text, preconditions, main, _more(snapshot)[:MOST_OTHERS])
@@ -392,6 +389,15 @@ def _not_accepted_view(preconditions: tuple[Precondition, ...], snapshot: Snapsh
         (hand_found(snapshot), hand_still(snapshot), *preconditions),
         main,
         (*others[: MOST_OTHERS - 1], ButtonSpec(end_action(snapshot), tr("Finish a&s it is"))),
+    )
+
+
+def _more_helps(snapshot: Snapshot) -> bool:
+    """Return whether anything that can be advised is expected to bring *Good* nearer."""
+    results = snapshot.procedure.results
+    return results is None or any(
+        is_helpful(one, results.benefits[eye], snapshot.settings.solve.verdict)
+        for eye, one in results.advice.items()
     )
 
 
@@ -622,6 +628,11 @@ def save_view(snapshot: Snapshot) -> WizardView:
                 "The session is finished, but its result is not good yet. Go back to measure more, "
                 "or continue with the next wearer."
             )
+            if not _more_helps(snapshot):
+                text = tr(
+                    "The session is finished. Its result is used, though it is not good yet: more "
+                    "would hardly change it. Continue with the next wearer."
+                )
         elif doubted:
             text = tr(
                 "The session is finished, but trials of {} are over the target. Go back to measure "
@@ -632,6 +643,8 @@ def save_view(snapshot: Snapshot) -> WizardView:
         text = tr("Everything is already saved. Finish the session when you are done.")
         if judged and not is_settled:
             text = tr("Not good yet. Go back to measure more, or finish as it is; all is saved.")
+            if not _more_helps(snapshot):
+                text = tr("Not good yet, and more would hardly change that. Finish; all is saved.")
         elif doubted:
             text = tr(
                 "Trials of {} are over the target. Go back to measure again, or finish as it is; "

@@ -122,7 +122,8 @@ def _error(
     if verdict in ("implausible", "contradicted"):
         return ""
     is_verified = verdict in USED and eye in record.verified_now and eye in results.verified
-    return (tr("{:.1f}′ verified") if is_verified else tr("{:.1f}′ expected")).format(arcmin)
+    text = tr("{:.1f}′ after verification") if is_verified else tr("{:.1f}′ expected")
+    return text.format(arcmin)
 
 
 def _drawn(drawn: DrawnShift) -> str:

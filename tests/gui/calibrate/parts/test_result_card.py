@@ -114,7 +114,7 @@ def test_an_error_is_verified_only_while_its_verification_counts(
     assert "verified" not in eye_results(results, verified, TARGET)["left"].error
     results = replace(results, verified={"left": Verified(6.5, 3.0, 6.5, 0.0, 6.5, 1)})
     found = eye_results(results, verified, TARGET)
-    assert found["left"].error.endswith("verified")
+    assert found["left"].error.endswith("after verification")
     assert found["right"].error.endswith("expected")
     later = replace(verified, verified_now=frozenset())
     assert eye_results(results, later, TARGET)["left"].error.endswith("expected")
