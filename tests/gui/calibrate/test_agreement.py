@@ -56,7 +56,7 @@ def test_one_final_shift_one_verdict_and_one_error(qtbot: QtBot, tmp_path: Path,
         assert f"Final φ: {kind}" in copied
         assert text(page, f"card-drawn-{eye}").startswith(f"Final φ: {kind}")
         word = entry.eyes[eye].word
-        assert word == VERDICT_WORDS.get(row["verdict"], kind.capitalize())  # type: ignore[call-overload]
+        assert word == VERDICT_WORDS.get(row["verdict"], kind.capitalize())  # type: ignore[arg-type]
         for said in (copied, text(page, f"card-verdict-{eye}"), report):
             assert word in said
         error = f"{float(row['expected_error_arcmin']):.1f}′"
