@@ -73,7 +73,7 @@ BAD: dict[str, tuple[Callable[[Alignment], Alignment], str]] = {
     "far point": (lambda one: with_point(one, 1e300), "points as far away"),
     "NaN shift": (lambda one: drawn(one, np.nan), "drawn_shift_m"),
     "large shift": (lambda one: drawn(one, 5.0), "drawn_shift_m"),
-    "millimetres": (lambda one: replace(one, hand_m=1e3 * one.hand_m), "metres are needed"),
+    "millimetres": (lambda one: replace(one, hand_m=1e3 * one.hand_m), "looks like millimetres"),
     "NaN rotation": (lambda one: replace(one, rotation_rad=np.full(3, np.nan)), "rotation_rad"),
     "no pose": (lambda one: replace(one, T_E_W={}), "without pose"),
     "one point": (
