@@ -181,12 +181,11 @@ def result_rows(results: Results, trials: Row | None = None) -> list[Row]:
         )
     if warning := results.fused.prior.warning:
         rows.append(Row(tr("Learned prior"), (tr("not used"),), tr("Not used: {}").format(warning)))
-    alignments, verified = len(results.alignments), len(results.fused.verified)
-    fused = pluralize(alignments, tr("alignment"), tr("alignments"))
-    if not alignments:
-        fused = pluralize(verified, tr("verified eye"), tr("verified eyes"))
-    elif verified:
-        fused = tr("{}, {} verified").format(fused, verified)
+    held = (
+        (len(results.alignments), tr("alignment"), tr("alignments")),
+        (len(results.fused.verified), tr("verified eye"), tr("verified eyes")),
+    )
+    fused = ", ".join(pluralize(*one) for one in held if one[0])
     meaning = tr("Alignments and verified eyes that were fused; solver: {}").format(results.method)
     return [*rows, Row(tr("Solved from"), (fused,), meaning)]
 

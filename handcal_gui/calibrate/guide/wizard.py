@@ -347,7 +347,7 @@ def _count(snapshot: Snapshot, view: WizardView) -> tuple[int, int, str]:
     procedure, record, plan = snapshot.procedure, snapshot.record, snapshot.plan
     if view.omitted or view.step in OF_THE_RESULT:
         verified = set(record.facts.verified) & set(plan.usable_eyes)
-        return len(verified), len(plan.usable_eyes), tr("verified")
+        return len(verified), len(plan.usable_eyes), tr("eyes verified")
     done = len(record.alignments)
     is_in_turn = plan.name == "recommended" or plan.in_turn
     planned = len(plan.usable_eyes) if is_in_turn else 1

@@ -102,7 +102,7 @@ def test_a_result_of_verifications_alone_has_no_numbers_of_a_registration(rig: R
 def test_a_result_names_all_that_it_was_solved_from(results: Results, rig: Rig) -> None:
     fused = replace(results.fused, verified={"left": ()})
     rows = result_rows(replace(results, fused=fused))
-    assert cells(rows, "Solved from") == ("2 alignments, 1 verified",)
+    assert cells(rows, "Solved from") == ("2 alignments, 1 verified eye",)
 
 
 def test_an_eye_that_took_no_part_has_no_numbers(left_only: Results, rig: Rig) -> None:

@@ -244,7 +244,7 @@ def test_after_a_slip_no_step_is_ticked_that_was_left_out_and_eyes_are_counted(
     assert progress.text().startswith("2/3 aligned"), "one more is being made"
     panel.show_snapshot(first)
     panel.show_snapshot(planned_snapshot(snapshot, StepName.VERIFY))
-    assert progress.text() == "0/2 verified"
+    assert progress.text() == "0/2 eyes verified"
     again = replace(
         record,
         facts=replace(record.facts, former="ada-1"),
@@ -256,10 +256,10 @@ def test_after_a_slip_no_step_is_ticked_that_was_left_out_and_eyes_are_counted(
     texts = _texts(panel)
     assert "✓ Show hand" in texts
     assert {"Make cursor", "Align", "Solve"} <= texts
-    assert progress.text().startswith("1/2 verified")
+    assert progress.text().startswith("1/2 eyes verified")
     once_more = replace(slipped.procedure, state=State.VERIFY, verifying=NUDGED)
     panel.show_snapshot(replace(slipped, procedure=once_more))
-    assert progress.text().startswith("1/2 verified"), "as the table says"
+    assert progress.text().startswith("1/2 eyes verified"), "as the table says"
 
 
 def test_names_and_paths_like_markup_are_shown_as_they_are(
