@@ -25,7 +25,7 @@ from PySide6.QtCore import QEvent, QObject, Qt, QTimer
 from PySide6.QtWidgets import QApplication
 
 from handcal.calibration.states import State
-from handcal.camera.camera import Camera
+from handcal.camera.feed import CameraFeed
 from handcal.core.errors import HandcalError
 from handcal.core.geometry import rigid
 from handcal.core.types import CameraIdentity, Frame
@@ -117,11 +117,8 @@ class _ReplayStation(Station):
     """A station that replays frames instead of opening a camera."""
 
     def __init__(self, replay: _ReplayFrames, settings: StationSettings) -> None:
-        self._replay = replay
         super().__init__(settings, "Benchmark", pairings=_KEY)
-
-    def _open_camera(self) -> Camera:
-        return _ReplayCamera(self._replay)
+        self._feed = CameraFeed(lambda: _ReplayCamera(replay))  # the other never opened
 
 
 class _Measurement(QObject):
