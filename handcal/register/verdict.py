@@ -22,7 +22,7 @@ from handcal.register.prior import eye_position_m, eye_slice
 MOST_ALIGNMENTS = 10
 MISFIT = "Drawing and hand differ in a way that no eye explains. Check the rig's depth edges."
 """Said of observations beyond what 95 % of usual wearers make."""
-HARDLY = "More measurements would hardly change that. The result is used as it is."
+HARDLY = "More measurements would hardly change that. It can be used as it is."
 """Said where no step that can be advised brings *accept* nearer."""
 RMS_MAX_M = 0.005
 """Largest distance of hand and cursor, root mean square, that is not to be repeated."""

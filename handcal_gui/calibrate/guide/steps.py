@@ -371,7 +371,8 @@ def _not_accepted_view(preconditions: tuple[Precondition, ...], snapshot: Snapsh
     if any(one.verdict in UNUSABLE for one in preconditions):
         text = tr("Do not use this result. Follow the advice below, then add alignments.")
     elif not _more_helps(snapshot):
-        text = tr("Not good yet, and more would hardly change that. Finish as it is, or go on.")
+        text = tr("Not good yet: {}. More would hardly change that. Finish as it is, or go on.")
+        text = text.format(_not_settled(snapshot))
         main = ButtonSpec(end_action(snapshot), tr("Finish as it is"))
         return WizardView(Step.VERIFY, text, preconditions, main, _more(snapshot)[:MOST_OTHERS])
     elif again and all(eye in snapshot.record.facts.verified for eye in usable):
@@ -399,6 +400,13 @@ def _more_helps(snapshot: Snapshot) -> bool:
         is_helpful(one, results.benefits[eye], snapshot.settings.solve.verdict)
         for eye, one in results.advice.items()
     )
+
+
+def _not_settled(snapshot: Snapshot) -> str:
+    """Return the names of the eyes whose result is not good yet."""
+    results = snapshot.procedure.results
+    verdicts = results.verdicts if results is not None else {}
+    return eye_names([eye for eye, one in verdicts.items() if one.name not in SETTLED])
 
 
 def connect_view(snapshot: Snapshot) -> WizardView:
@@ -630,9 +638,9 @@ def save_view(snapshot: Snapshot) -> WizardView:
             )
             if not _more_helps(snapshot):
                 text = tr(
-                    "The session is finished. Its result is used, though it is not good yet: more "
-                    "would hardly change it. Continue with the next wearer."
-                )
+                    "The session is finished. Not good yet: {}. More would hardly change that. "
+                    "Continue with the next wearer."
+                ).format(_not_settled(snapshot))
         elif doubted:
             text = tr(
                 "The session is finished, but trials of {} are over the target. Go back to measure "
@@ -644,7 +652,8 @@ def save_view(snapshot: Snapshot) -> WizardView:
         if judged and not is_settled:
             text = tr("Not good yet. Go back to measure more, or finish as it is; all is saved.")
             if not _more_helps(snapshot):
-                text = tr("Not good yet, and more would hardly change that. Finish; all is saved.")
+                text = tr("Not good yet: {}. More would hardly change that. Finish; all is saved.")
+                text = text.format(_not_settled(snapshot))
         elif doubted:
             text = tr(
                 "Trials of {} are over the target. Go back to measure again, or finish as it is; "

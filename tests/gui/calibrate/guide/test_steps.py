@@ -198,7 +198,7 @@ def test_the_end_says_which_eye_to_verify_again(snapshot: Maker) -> None:
     sure = replace(results.benefits["right"], after_arcmin=3.0, probability_better=0.98)
     hardly = replace(results, benefits=dict(results.benefits) | {"right": sure})
     view = begun().view(replace(done, procedure=replace(done.procedure, results=hardly)))
-    assert view.sentence.startswith("Not good yet, and more would hardly change that.")
+    assert view.sentence.startswith("Not good yet: the right eye. More would hardly change that.")
     assert view.main.action is Action.FINISH, "no step that its own forecast calls useless"
     worse = replace(results.benefits["right"], after_arcmin=20.0)
     results = replace(
