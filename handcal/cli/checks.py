@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import subprocess
 import sys
 from contextlib import ExitStack
@@ -146,8 +147,9 @@ def _bench_window(frames: int, rate_hz: int, progress: Progress) -> dict[str, An
     command = [sys.executable, "-m", "handcal_gui.benchmark", "--frames", str(frames)]
     command += ["--rate", str(rate_hz)]
     last = "no reason was given"
+    environment = {"OMP_NUM_THREADS": "1", **os.environ}  # as the program sets it
     with subprocess.Popen(  # noqa: S603
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
     ) as process:
         assert process.stdout is not None
         assert process.stderr is not None

@@ -30,6 +30,8 @@ _EXPOSED_S = 0.3
 
 def main() -> NoReturn:
     """Run the program; the exit status is 0, 1 if it fails, 2 for wrong arguments or no display."""
+    # Before NumPy is imported: threads for its small matrices take turns with those of the window.
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
     arguments = _parser().parse_args()
     _require_display()
     keep_font_list_in_configuration()

@@ -148,6 +148,20 @@ def test_it_starts_where_the_capital_of_i_has_a_dot(
     start_and_end(tmp_path)
 
 
+@pytest.mark.process
+def test_the_threads_of_numpy_are_set_before_it_is_imported() -> None:
+    code = (
+        "import os, sys; from handcal_gui.app import start; sys.argv = ['handcal-gui']; "
+        "start._require_display = lambda: "
+        "sys.exit(f\"{os.environ['OMP_NUM_THREADS']} {'numpy' in sys.modules}\"); start.main()"
+    )
+    environment = {name: text for name, text in os.environ.items() if name != "OMP_NUM_THREADS"}
+    ended = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=60.0
+    )
+    assert ended.stderr.strip() == "1 False"
+
+
 def start_and_end(folder: Path) -> None:
     """Start the program, tell it to end, and expect that it ends well."""
     preferences = folder / "preferences.json"
