@@ -17,7 +17,7 @@ from handcal.session.drawn import (
     ShiftKind,
     drawn_error_arcmin,
     drawn_shifts,
-    is_judged,
+    is_verified,
 )
 from handcal.session.record import eye_trials
 from handcal.session.session import SessionRecord
@@ -74,12 +74,8 @@ class SessionOutcome:
 
     def is_verified(self, eye: Eye) -> bool:
         """Return whether the wearer verified what is final, with the present alignments."""
-        results = self.results
-        return (
-            results is not None
-            and eye in results.verified
-            and eye in self.record.verified_now
-            and is_judged(results.verdicts[eye].name, self.drawn[eye].kind)
+        return self.results is not None and is_verified(
+            self.record, self.results, eye, self.drawn[eye].kind
         )
 
     def expected_arcmin(self, eye: Eye, kind: ShiftKind) -> float | None:

@@ -83,6 +83,15 @@ def is_judged(verdict: str, kind: ShiftKind) -> bool:
     return kind == "solved" or (kind == "offline" and verdict not in USED)
 
 
+def is_verified(record: SessionRecord, results: Results, eye: Eye, kind: ShiftKind) -> bool:
+    """Return whether the wearer verified the final φ of an eye, with the present alignments."""
+    return (
+        eye in results.verified
+        and eye in record.verified_now
+        and is_judged(results.verdicts[eye].name, kind)
+    )
+
+
 def result_word(verdict: VerdictName, kind: ShiftKind) -> str:
     """Return the verdict on an eye in a word, or where its φ comes from if that was not judged."""
     return VERDICT_WORDS[verdict] if is_judged(verdict, kind) else kind.capitalize()

@@ -11,12 +11,14 @@ from handcal.register.benefit import percent
 from handcal.register.fuse import Fused, Misfit, Observation
 from handcal.register.prior import eye_prior, eye_slice
 from handcal.register.verdict import (
+    HARDLY,
     MISFIT,
     Advice,
     VerdictSettings,
     advise,
     describe_verified,
     eye_benefit,
+    is_helpful,
     judge,
 )
 from handcal.rig.example import HALF_EYE_DISTANCE_M, example_rig
@@ -204,6 +206,24 @@ def test_no_error_is_foreseen_that_is_not_less_than_now(target_arcmin: float) ->
     said = [float(number) for number in re.findall(r"([\d.]+)′", foreseen)]
     assert all(arcmin < now_arcmin for arcmin in said)
     assert bool(said) == (now_arcmin > target_arcmin)
+
+
+def test_no_step_is_foreseen_to_harm_and_one_that_hardly_helps_is_called_so() -> None:
+    """As where the wearer is judged for several precisions, and foreseen for one."""
+    uncertain = replace(
+        GOOD,
+        shift_m=np.array([0.0025, 0.0, 0.003]),
+        covariance_m2=np.diag([0.0009, 0.0009, 0.0014]) ** 2,
+    )
+    fused = _fused({"left": uncertain})
+    (usual,) = fused.observed
+    rough_m2 = 1e4 * usual.wearer_m2
+    fused = replace(fused, observed=(replace(usual, registration_m2=rough_m2),))
+    advice, gain = advise(RIG, fused, "left", SETTINGS), eye_benefit(RIG, fused, "left")
+    assert advice.after_arcmin <= gain.after_arcmin
+    assert advice.probability_better >= gain.probability_better
+    assert not is_helpful(advice, gain, SETTINGS)
+    assert _judge_fused(fused)["left"].reason.endswith(HARDLY)
 
 
 def test_a_verdict_tells_what_the_wearer_moved_and_what_it_changed() -> None:

@@ -17,6 +17,7 @@ from handcal.session.drawn import (
     drawn_error_arcmin,
     drawn_shifts,
     is_judged,
+    is_verified,
     result_word,
 )
 from handcal.session.record import SessionRecord, eye_trials
@@ -121,8 +122,8 @@ def _error(
         return tr("{:.1f}′ in trials").format(trials.mean_arcmin)
     if verdict in ("implausible", "contradicted"):
         return ""
-    is_verified = verdict in USED and eye in record.verified_now and eye in results.verified
-    text = tr("{:.1f}′ after verification") if is_verified else tr("{:.1f}′ expected")
+    is_after = verdict in USED and is_verified(record, results, eye, "solved")
+    text = tr("{:.1f}′ after verification") if is_after else tr("{:.1f}′ expected")
     return text.format(arcmin)
 
 

@@ -30,6 +30,7 @@ from handcal_gui.calibrate.fine_tune.panel import (
 from tests.gui.calibrate.conftest import Engine
 from tests.gui.calibrate.fine_tune.controls import Show, action, editor, field, fields_mm, status
 from tests.gui.helpers import text
+from tests.gui.views import NUDGED
 
 OFFLINE: Shifts = {eye: np.zeros(3) for eye in EYES}
 CTRL, SHIFT = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.ShiftModifier
@@ -189,6 +190,13 @@ def test_tells_what_it_does_at_the_target(panel: FineTunePanel, show: Show, rig:
         shown = text(editor(panel, "left"), "effect").split("\n")[0]
         px = float(shown.removeprefix("Right ").split(" px")[0].replace("−", "-"))
         assert px == pytest.approx(effect.right_px, abs=0.15)
+
+
+def test_in_a_verification_only_the_guide_tells_the_move(panel: FineTunePanel, show: Show) -> None:
+    show()
+    assert text(editor(panel, "left"), "effect")
+    show(State.VERIFY, procedure={"verifying": NUDGED})
+    assert not text(editor(panel, "left"), "effect")
 
 
 def test_the_effect_is_against_the_calibrated_phi_also_of_an_eye_that_keeps_the_offline_one(

@@ -22,10 +22,12 @@ from pytestqt.qtbot import QtBot
 from handcal.camera.settings import RealSenseSettings
 from handcal.station.checks.doctor import Health
 from handcal.station.checks.preflight import Part
+from handcal.station.settings import StationSettings
 from handcal_gui.app.preferences import Preferences
 from handcal_gui.calibrate.start.session_entries import Entry, KnownSessions
 from handcal_gui.calibrate.start.start_page import StartPage
 from tests.gui.calibrate.start.conftest import (
+    KEY,
     NETWORK,
     Inspector,
     button,
@@ -303,3 +305,15 @@ def test_a_realsense_is_looked_for_less_often(
     assert not inspector.progress.is_cancelled()
     page.stop()
     assert inspector.progress.is_cancelled()  # a process that hangs is not waited for
+
+
+def test_a_list_is_not_called_empty_before_it_was_looked_for(
+    qtbot: QtBot, inspector: Inspector, tmp_path: Path
+) -> None:
+    settings = StationSettings(sessions=str(tmp_path))
+    page = StartPage(Preferences(station=settings), KEY, inspector.check, inspector.find)
+    qtbot.addWidget(page)
+    assert text(page.recent, "empty") == "Looking for sessions…"
+    page.show()
+    qtbot.waitUntil(lambda: text(page.recent, "empty").startswith("No session yet"))
+    page.stop()
